@@ -1,0 +1,61 @@
+// Block sizes from footprints (thesis 3.5, eqs. 3.2, 3.3): the bias that makes the wish list fit, the adaptive target,
+// and hysteresis against flicker between two levels (thesis 8.3).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "atlas/placement.h"
+#include "scene/visible_set.h"
+
+namespace tessera::atlas {
+
+struct LevelSettings {
+  uint8_t max_log = 8;           // log2 of the superblock's side
+  float hysteresis = 0.25f;      // in levels of area: a patch changes only when its wish lies this far past the border
+  float min_bias = -2.0f;        // negative: the atlas has room for more than one texel a pixel (thesis 4.1)
+  float max_bias = 16.0f;
+  float color_area_px2 = 1.5f;   // biased area below which a patch becomes a single colour
+};
+
+// The patch's traits that level selection needs.
+struct PatchTraits {
+  uint8_t triangle_count = 1;  // a lone triangle fills half of its block
+  bool masked = false;         // needs two halves
+};
+
+struct LevelWish {
+  bool single_color = false;
+  Level level;
+  bool transposed = false;
+};
+
+// Ideal block area of a footprint, in texels, before bias: what the triangles need on screen, times the share of the
+// block that they leave unused.
+float ideal_area(const scene::Footprint& footprint, const PatchTraits& traits);
+
+// The level for one patch (eq. 3.2). `previous` (or nullptr) anchors the hysteresis. Total: any finite or infinite
+// footprint gives a valid level; NaN counts as 0.
+LevelWish select_level(const scene::Footprint& footprint, const PatchTraits& traits, float bias,
+                       const LevelWish* previous, const LevelSettings& settings);
+
+// Global bias b (eq. 3.3) for `target_texels`: b = log2((I - d) / (S - d)), iterated because blocks are clamped at both
+// ends. Monotonic: a smaller target never gives a smaller bias. Clamped to [min_bias, max_bias].
+float select_bias(std::span<const float> ideal_areas, double target_texels, const LevelSettings& settings);
+
+// The target S, calibrated by experience (thesis 3.5): a reset because memory ran out shrinks it, quiet time grows it.
+class AdaptiveTarget {
+ public:
+  explicit AdaptiveTarget(double atlas_texels) : atlas_texels_(atlas_texels), share_(0.8) {}
+  double texels() const { return share_ * atlas_texels_; }
+  void on_out_of_memory();
+  void on_quiet_frame();
+
+ private:
+  double atlas_texels_;
+  double share_;
+  int quiet_frames_ = 0;
+};
+
+}  // namespace tessera::atlas

@@ -1,0 +1,83 @@
+// What the client must know beside the atlas to draw frame N: new meshes, vertices, objects and patches, moved objects,
+// and changed placements. Plain values; bits in meta_codec.h; format in docs/meta-format.md. Standard library only.
+//
+// Ids are dense and count from 0 in order of transmission, so new things carry no id. The client keeps everything that it
+// was ever sent in a session; a patch that is not visible has placement kind `none`.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace tessera::geometry_compression {
+
+// A set of vertices in its own space: position = offset + step * q.
+struct NewMesh {
+  std::array<double, 3> offset{};
+  double step = 1;  // > 0
+  bool operator==(const NewMesh&) const = default;
+};
+
+struct NewVertex {
+  uint32_t mesh = 0;
+  std::array<int32_t, 3> q{};  // |q| < 2^30
+  bool operator==(const NewVertex&) const = default;
+};
+
+// Mesh space to world, column-major 3x3 and a translation.
+struct Transform {
+  std::array<float, 9> linear{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  std::array<double, 3> translation{};
+  bool operator==(const Transform&) const = default;
+};
+
+struct NewObject {
+  Transform transform;
+  bool mirrored = false;      // the transform reverses the winding
+  bool double_sided = false;
+  bool masked = false;        // its patches have coverage
+  bool operator==(const NewObject&) const = default;
+};
+
+struct MovedObject {
+  uint32_t object = 0;
+  Transform transform;
+  bool operator==(const MovedObject&) const = default;
+};
+
+// Vertices in the order of the block's corners (scene::Patch): 3, 4 or 5 of them:
+//   1 triangle: (0,0) (1,0) (0,1)   2: + (1,1)   3: (0,0) (1,0) (.5,1) (0,1) (1,1)
+struct NewPatch {
+  uint32_t object = 0;
+  uint8_t triangles = 1;                 // 1..3
+  std::array<uint32_t, 5> vertices{};    // vertex ids; the first triangles + 2 are used, the rest 0
+  bool operator==(const NewPatch&) const = default;
+};
+
+enum class PlacementKind : uint8_t { none = 0, block = 1, color = 2 };
+
+struct PatchPlacement {
+  uint32_t patch = 0;
+  PlacementKind kind = PlacementKind::none;
+  uint16_t x = 0, y = 0;          // kind block: texels, even, < 8192
+  uint8_t log_w = 0, log_h = 0;   // kind block: 1..8
+  bool transposed = false;        // kind block
+  uint32_t rgb = 0;               // kind color: 0xBBGGRR, sRGB
+  bool operator==(const PatchPlacement&) const = default;
+};
+
+struct MetaFrame {
+  uint32_t frame = 0;
+  uint32_t rtp_timestamp = 0;
+  uint16_t atlas_width = 0, atlas_height = 0;  // even, <= 8192
+  bool full_state = false;  // the client forgets everything before applying this one (first frame, resume)
+  std::vector<NewMesh> meshes;
+  std::vector<NewVertex> vertices;
+  std::vector<NewObject> objects;
+  std::vector<MovedObject> moved;      // sorted by object
+  std::vector<NewPatch> patches;
+  std::vector<PatchPlacement> placements;  // sorted by patch, each once
+  bool operator==(const MetaFrame&) const = default;
+};
+
+}  // namespace tessera::geometry_compression
