@@ -71,7 +71,7 @@ mat4 projection_matrix(const Fov& fov, float near_m) {
 mat4 view_matrix(const Pose& pose, const dvec3& origin) {
   const glm::dmat3 world_to_camera = glm::mat3_cast(glm::conjugate(pose.orientation));
   const dvec3 translation = -(world_to_camera * (pose.position - origin));
-  mat4 m(mat3(world_to_camera));
+  mat4 m = mat4(mat3(world_to_camera));
   m[3] = vec4(vec3(translation), 1.0f);
   return m;
 }

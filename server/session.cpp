@@ -1,0 +1,166 @@
+#include "server/session.h"
+
+#include <optional>
+
+#include "base/log.h"
+#include "codec/yuv_converter.h"
+#include "pvs/retention.h"
+#include "server/meta_builder.h"
+
+namespace tessera::server {
+namespace {
+
+constexpr double kRtpClockHz = 90'000;
+
+// Wall time since the last lap.
+class Stopwatch {
+ public:
+  double lap_ms() {
+    const TimeNs now = clock_.now();
+    const double ms = to_ms(now - last_);
+    last_ = now;
+    return ms;
+  }
+
+ private:
+  SteadyClock clock_;
+  TimeNs last_ = clock_.now();
+};
+
+MetaSettings meta_settings(const SessionSettings& settings) {
+  return {.atlas_width = static_cast<uint16_t>(settings.layout.width),
+          .atlas_height = static_cast<uint16_t>(settings.layout.height)};
+}
+
+}  // namespace
+
+struct Session::Impl {
+  SessionSettings settings;
+  std::shared_ptr<SharedScene> scene;
+  FramePlan plan;
+  std::unique_ptr<scene::SceneInstant> instant;
+  std::unique_ptr<pvs::Visibility> visibility;
+  std::optional<pvs::Retention> retention;
+  std::unique_ptr<atlas::blocks::Layout> layout;
+  std::unique_ptr<shading::Gather> gather;
+  std::unique_ptr<codec::YuvConverter> converter;
+  std::unique_ptr<codec::VideoEncoder> encoder;
+  std::optional<MetaBuilder> meta;
+  bool first = true;
+
+  std::vector<View> views;
+  scene::VisiblePatches seen;
+
+  Status set_up();
+  Status find_visible(const FrameInput& input, FrameStats& stats);
+  Status shade(const dvec3& eye, FrameStats& stats);
+  Status encode(const FrameInput& input, const atlas::LayoutDelta& delta, Frame& frame);
+};
+
+Status Session::Impl::set_up() {
+  gpu::Device& device = scene->device();
+  plan = make_frame_plan(scene->scene().features);
+  TESSERA_ASSIGN_OR_RETURN(instant, scene::SceneInstant::create(device, scene->gpu_scene()));
+  TESSERA_ASSIGN_OR_RETURN(visibility, pvs::Visibility::create(device, scene->gpu_scene(), settings.visibility));
+  TESSERA_ASSIGN_OR_RETURN(layout, atlas::blocks::Layout::create(scene->scene(), settings.layout));
+  const shading::GatherSettings gather_settings{settings.layout.width, settings.layout.height, settings.gather_path};
+  TESSERA_ASSIGN_OR_RETURN(gather,
+                           shading::Gather::create(device, scene->gpu_scene(), scene->lighting(), gather_settings));
+  TESSERA_ASSIGN_OR_RETURN(converter,
+                           codec::YuvConverter::create(device, settings.layout.width, settings.layout.height));
+  const codec::VideoSettings video{.width = settings.layout.width,
+                                   .height = settings.layout.height,
+                                   .frames_per_second = settings.rate.frames_per_second,
+                                   .bitrate_bps = settings.rate.bitrate_bps,
+                                   .encoder = settings.encoder};
+  TESSERA_ASSIGN_OR_RETURN(encoder, codec::VideoEncoder::create(video));
+  meta.emplace(scene->scene(), meta_settings(settings));
+  return absl::OkStatus();
+}
+
+Status Session::Impl::find_visible(const FrameInput& input, FrameStats& stats) {
+  const TimedPose& newest = input.poses.back();
+  pvs::PredictionSettings prediction = settings.prediction;
+  prediction.horizon_ns = input.round_trip_ns + from_seconds(1.0 / settings.rate.frames_per_second);
+  views = pvs::predict_views(input.poses, newest.time_ns, settings.client_view, prediction);
+
+  instant->set(input.scene_time_ns, newest.pose.position);
+  TESSERA_RETURN_IF_ERROR(scene->lighting().update(*instant));
+  TESSERA_ASSIGN_OR_RETURN(seen, visibility->determine(*instant, views, settings.client_view));
+  stats.predicted_views = static_cast<uint32_t>(views.size());
+  stats.visible_patches = seen.size();
+  stats.visibility = visibility->stats();
+  return absl::OkStatus();
+}
+
+Status Session::Impl::shade(const dvec3& eye, FrameStats& stats) {
+  gpu::Device& device = scene->device();
+  gpu::Commands commands = device.begin();
+  TESSERA_RETURN_IF_ERROR(gather->record(commands, *instant, eye, layout->placements()));
+  commands.barrier();
+  TESSERA_RETURN_IF_ERROR(converter->record(commands, gather->image()));
+  TESSERA_RETURN_IF_ERROR(device.run(std::move(commands)));
+  stats.gather = gather->stats();
+  return absl::OkStatus();
+}
+
+Status Session::Impl::encode(const FrameInput& input, const atlas::LayoutDelta& delta, Frame& frame) {
+  geometry_compression::MetaFrame values = meta->build(frame.number, delta, layout->placements(), gather->colors(),
+                                                       instant->instance_transforms());
+  values.rtp_timestamp =
+      static_cast<uint32_t>(static_cast<uint64_t>(to_seconds(input.poses.back().time_ns) * kRtpClockHz));
+  frame.meta = geometry_compression::encode(values, &frame.stats.meta_bits);
+
+  const bool key_frame = std::exchange(first, false) || input.key_frame;
+  const double budget = settings.rate.atlas_bits(8.0 * static_cast<double>(frame.meta.size()), key_frame);
+  TESSERA_ASSIGN_OR_RETURN(frame.atlas, encoder->encode(frame.number, converter->result(), budget, key_frame));
+  return absl::OkStatus();
+}
+
+Session::Session(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Session::~Session() = default;
+
+StatusOr<std::unique_ptr<Session>> Session::create(std::shared_ptr<SharedScene> scene, const SessionSettings& settings) {
+  auto impl = std::make_unique<Impl>();
+  impl->settings = settings;
+  impl->scene = std::move(scene);
+  TESSERA_RETURN_IF_ERROR(impl->set_up());
+  spdlog::info("session: encoder {}", impl->encoder->choice());
+  return std::unique_ptr<Session>(new Session(std::move(impl)));
+}
+
+StatusOr<Frame> Session::render(const FrameInput& input) {
+  if (input.poses.empty()) return absl::InvalidArgumentError("session: a frame needs at least one pose");
+  Frame frame;
+  frame.number = input.number;
+  frame.pose = input.poses.back();
+  Stopwatch watch;
+  StageTimes& times = frame.stats.times;
+
+  TESSERA_RETURN_IF_ERROR(impl_->find_visible(input, frame.stats));
+  if (!impl_->retention) impl_->retention.emplace(input.round_trip_ns);
+  const scene::VisiblePatches kept = impl_->retention->update(frame.pose.time_ns, impl_->seen);
+  times.visibility_ms = watch.lap_ms();
+
+  const atlas::LayoutDelta delta = impl_->layout->update(kept);
+  frame.stats.placed_patches = kept.size();
+  frame.stats.layout = impl_->layout->stats();
+  times.layout_ms = watch.lap_ms();
+
+  TESSERA_RETURN_IF_ERROR(impl_->shade(frame.pose.pose.position, frame.stats));
+  times.shading_ms = watch.lap_ms();
+
+  TESSERA_RETURN_IF_ERROR(impl_->encode(input, delta, frame));
+  times.encode_ms = watch.lap_ms();
+  return frame;
+}
+
+const FramePlan& Session::plan() const { return impl_->plan; }
+const std::string& Session::encoder() const { return impl_->encoder->choice(); }
+std::span<const View> Session::views() const { return impl_->views; }
+const scene::VisiblePatches& Session::seen() const { return impl_->seen; }
+std::span<const atlas::Placement> Session::placements() const { return impl_->layout->placements(); }
+const gpu::Image& Session::atlas_image() const { return impl_->gather->image(); }
+YuvView Session::yuv() const { return impl_->converter->result(); }
+
+}  // namespace tessera::server
