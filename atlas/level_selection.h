@@ -31,17 +31,27 @@ struct LevelWish {
   bool transposed = false;
 };
 
-// Ideal block area of a footprint, in texels, before bias: what the triangles need on screen, times the share of the
-// block that they leave unused.
+// What a footprint asks for, before bias; both finite.
+struct BlockNeed {
+  float area = 0;        // texels: what the triangles need on screen, and the part of the block that they leave unused
+  float elongation = 1;  // longer edge : shorter edge
+  bool upright = false;  // v is the longer one
+};
+BlockNeed block_need(const scene::Footprint& footprint, const PatchTraits& traits);
+
+// Ideal block area of a footprint: the area of its block_need().
 float ideal_area(const scene::Footprint& footprint, const PatchTraits& traits);
 
 // The level for one patch (eq. 3.2). `previous` (or nullptr) anchors the hysteresis. Total: any finite or infinite
 // footprint gives a valid level; NaN counts as 0.
 LevelWish select_level(const scene::Footprint& footprint, const PatchTraits& traits, float bias,
                        const LevelWish* previous, const LevelSettings& settings);
+LevelWish select_level(const BlockNeed& need, bool masked, float bias, const LevelWish* previous,
+                       const LevelSettings& settings);
 
-// Global bias b (eq. 3.3) for `target_texels`: b = log2((I - d) / (S - d)), iterated because blocks are clamped at both
-// ends. Monotonic: a smaller target never gives a smaller bias. Clamped to [min_bias, max_bias].
+// Global bias b for `target_texels`: the smallest that fits them. Eq. 3.3, b = log2((I - d) / (S - d)), is its value where
+// blocks are not clamped at either end, rounded, or replaced by a colour; here all of that counts. Monotonic: a smaller
+// target never gives a smaller bias. Clamped to [min_bias, max_bias].
 float select_bias(std::span<const float> ideal_areas, double target_texels, const LevelSettings& settings);
 
 // The target S, calibrated by experience (thesis 3.5): a reset because memory ran out shrinks it, quiet time grows it.

@@ -9,6 +9,7 @@
 #include "base/frame_number.h"
 #include "base/status.h"
 #include "base/time.h"
+#include "base/yuv.h"
 #include "client-sdk/scene_state.h"
 
 namespace tessera::client {

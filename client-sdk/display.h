@@ -2,6 +2,8 @@
 // (no vertex buffers: texelFetch(records, gl_VertexID / 3)).
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,7 +22,7 @@ struct DisplaySettings {
   std::array<uint8_t, 3> background{135, 168, 205};  // sRGB
 };
 
-// Owns an EGL context; use it from the thread that created it.
+// Owns an EGL context; use it from the thread that created it. Several displays may share a thread.
 class Display {
  public:
   static StatusOr<std::unique_ptr<Display>> create(const DisplaySettings& settings);
@@ -32,7 +34,7 @@ class Display {
   Status set_atlas(const Image8& atlas);  // uncoded, for the harness
   Status set_state(const SceneState& state);
 
-  // Draws one view into an offscreen framebuffer and reads it back.
+  // `view` has the size given in the settings. Draws it into an offscreen framebuffer and reads it back.
   StatusOr<Image8> draw(const View& view);
   struct StereoImage {
     Image8 left, right;

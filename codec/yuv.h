@@ -2,6 +2,8 @@
 // (nearest), as the client's shader does it. The reference for the device versions and for tests.
 #pragma once
 
+#include <cstddef>
+
 #include "base/image.h"
 #include "base/yuv.h"
 

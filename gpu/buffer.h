@@ -17,13 +17,14 @@ enum class Memory {
   readback,  // mapped and cached; written by the GPU, read by the CPU
 };
 
-// May be bound as storage, uniform, index or indirect buffer and copied in both directions. Contents start as zeros.
-// Move-only; destruction must wait for the work that uses it (see Device::submit).
+// May be bound as storage, uniform, index or indirect buffer and copied in both directions. Contents start as
+// zeros. Move-only; destruction must wait for the work that uses it (see Device::submit).
 class Buffer {
  public:
   static StatusOr<Buffer> create(Device& device, uint64_t bytes, Memory memory, std::string_view name);
   // Memory::device, filled with `data` through a staging copy (blocks).
-  static StatusOr<Buffer> create_filled(Device& device, std::span<const std::byte> data, std::string_view name);
+  static StatusOr<Buffer> create_filled(Device& device, std::span<const std::byte> data,
+                                        std::string_view name);
   Buffer();  // empty: size() == 0
   Buffer(Buffer&&) noexcept;
   Buffer& operator=(Buffer&&) noexcept;

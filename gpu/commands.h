@@ -1,6 +1,9 @@
 // Records one submission. Cheap to move; obtained from Device::begin().
 //
-// Ordering: passes are independent unless barrier() stands between them.
+// Ordering: passes are independent unless barrier() stands between them. A submission ends with one.
+//
+// Errors: the first mistake (a range outside a buffer, an unset binding) is kept, what follows it is not
+// recorded, and Device::submit returns it.
 #pragma once
 
 #include <array>
@@ -51,19 +54,22 @@ class Commands {
   void dispatch(uint32_t x, uint32_t y = 1, uint32_t z = 1);
   void dispatch_indirect(const Buffer& buffer, uint64_t offset);
 
-  // Raster, between begin_rendering and end_rendering. The viewport covers the target (negative height: +Y up).
+  // Raster, between begin_rendering and end_rendering. The viewport covers the target (negative height: +Y
+  // up).
   void begin_rendering(const RenderTarget& target);
   void end_rendering();
   void bind(const RasterPipeline& pipeline, std::initializer_list<const BindGroup*> groups);
   void set_cull(Cull cull);
   void set_viewport(uint32_t x, uint32_t y, uint32_t width, uint32_t height);  // viewport and scissor
   void bind_indices(const Buffer& buffer);                                     // uint32
-  void draw(uint32_t vertices, uint32_t instances = 1, uint32_t first_vertex = 0, uint32_t first_instance = 0);
+  void draw(uint32_t vertices, uint32_t instances = 1, uint32_t first_vertex = 0,
+            uint32_t first_instance = 0);
   void draw_indexed(uint32_t indices, uint32_t instances, uint32_t first_index, int32_t vertex_offset,
                     uint32_t first_instance);
-  // VkDrawIndexedIndirectCommand[] at `offset` in `buffer`, their number (uint32, <= max_draws) at `count_offset` in `count`.
-  void draw_indexed_indirect_count(const Buffer& buffer, uint64_t offset, const Buffer& count, uint64_t count_offset,
-                                   uint32_t max_draws);
+  // VkDrawIndexedIndirectCommand[] at `offset` in `buffer`, their number (uint32, <= max_draws) at
+  // `count_offset` in `count`.
+  void draw_indexed_indirect_count(const Buffer& buffer, uint64_t offset, const Buffer& count,
+                                   uint64_t count_offset, uint32_t max_draws);
 
   // Both pipeline kinds. `T` is a plain struct of at most 128 bytes.
   template <class T>
@@ -77,8 +83,10 @@ class Commands {
   void fill(const Buffer& buffer, uint32_t word, uint64_t offset = 0, uint64_t bytes = ~0ull);
   void clear(const Image& image, std::array<float, 4> color);
   // Tightly packed rows; one mip level of one layer.
-  void copy_to_image(const Buffer& from, uint64_t offset, const Image& to, uint32_t mip = 0, uint32_t layer = 0);
-  void copy_to_buffer(const Image& from, const Buffer& to, uint64_t offset = 0);
+  void copy_to_image(const Buffer& from, uint64_t offset, const Image& to, uint32_t mip = 0,
+                     uint32_t layer = 0);
+  void copy_to_buffer(const Image& from, const Buffer& to, uint64_t offset = 0, uint32_t mip = 0,
+                      uint32_t layer = 0);
   // Box-filters mip 0 down the chain, all layers (sRGB formats filter in linear light).
   void generate_mips(const Image& image);
 

@@ -1,7 +1,9 @@
-// A headless Vulkan 1.3 device with one queue. The rest of the house sees Vulkan only through gpu/: these headers hide
-// vulkan_raii.hpp and its exceptions, which end here as absl::Status with the failed call's name.
+// A headless Vulkan 1.3 device with one queue. The rest of the house sees Vulkan only through gpu/: these
+// headers hide vulkan_raii.hpp and its exceptions, which end here as absl::Status with the failed call's
+// name.
 //
-// Thread-safety: a Device may be used by one thread at a time (one render thread per device, docs/architecture.md).
+// Thread-safety: a Device may be used by one thread at a time (one render thread per device,
+// docs/architecture.md).
 #pragma once
 
 #include <cstdint>
@@ -14,8 +16,8 @@
 namespace tessera::gpu {
 
 struct DeviceOptions {
-  // "" = a hardware device if there is one, else software; "cpu" = software; a number = index in list_devices();
-  // else part of a device's name, case-insensitive.
+  // "" = a hardware device if there is one, else software; "cpu" = software; a number = index in
+  // list_devices(); else part of a device's name, case-insensitive.
   std::string select;
   // Load the validation layer (an error if it is not installed). On by default in debug builds.
 #ifdef NDEBUG
@@ -23,6 +25,8 @@ struct DeviceOptions {
 #else
   bool validation = true;
 #endif
+  // With `validation`: the layer also reports missing barriers (slow).
+  bool validate_synchronization = false;
 };
 
 struct DeviceInfo {
@@ -48,9 +52,11 @@ class Device {
 
   // A recorder for one submission. Record, then submit; a Commands is used once.
   Commands begin();
-  // Hands the recorded work to the queue. Buffers, images and pipelines that it uses must live until it is done.
+  // Hands the recorded work to the queue. Buffers, images and pipelines that it uses must live until it is
+  // done.
   StatusOr<Ticket> submit(Commands commands);
-  // Blocks until `ticket` is reached. DeadlineExceeded after 60 s (a hung device), Unavailable if the device is lost.
+  // Blocks until `ticket` is reached. DeadlineExceeded after 60 s (a hung device), Unavailable if the device
+  // is lost.
   Status wait(Ticket ticket);
   // submit + wait.
   Status run(Commands commands);

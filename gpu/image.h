@@ -1,4 +1,5 @@
-// 2D images and samplers. Images live in VK_IMAGE_LAYOUT_GENERAL from creation to destruction, so no pass tracks layouts.
+// 2D images and samplers. Images live in VK_IMAGE_LAYOUT_GENERAL from creation to destruction, so no pass
+// tracks layouts.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +12,17 @@
 
 namespace tessera::gpu {
 
-enum class Format { rgba8_unorm, rgba8_srgb, rgba16_float, rgba32_float, r32_uint, r32_float, r8_unorm, rg32_uint, depth32_float };
+enum class Format {
+  rgba8_unorm,
+  rgba8_srgb,
+  rgba16_float,
+  rgba32_float,
+  r32_uint,
+  r32_float,
+  r8_unorm,
+  rg32_uint,
+  depth32_float
+};
 
 struct ImageDesc {
   uint32_t width = 1, height = 1;
@@ -23,8 +34,8 @@ struct ImageDesc {
   bool array_view = false;  // sampled as sampler2DArray even with one layer
 };
 
-// Usable as attachment, sampled image and copy source/destination; as storage image if `storage`. Colour contents
-// start undefined, depth undefined. Move-only.
+// Usable as attachment, sampled image and copy source/destination; as storage image if `storage`. Colour
+// contents start undefined, depth undefined. Move-only.
 class Image {
  public:
   static StatusOr<Image> create(Device& device, const ImageDesc& desc, std::string_view name);

@@ -39,8 +39,8 @@ class BindLayout {
   std::unique_ptr<Impl> impl_;
 };
 
-// One descriptor set. Every binding must be set before use (an unwritten one crashes old lavapipe). Not to be changed
-// while submitted work uses it.
+// One descriptor set. Every binding must be set before use (an unwritten one crashes old lavapipe). Not to be
+// changed while submitted work uses it.
 class BindGroup {
  public:
   static StatusOr<BindGroup> create(Device& device, const BindLayout& layout);
@@ -96,8 +96,8 @@ class ComputePipeline {
 
 enum class Cull { none, back, front };
 
-// Triangles; front faces are counter-clockwise as seen with +Y up. Depth is reversed: nearer is greater, the test is
-// GREATER_OR_EQUAL. No vertex buffers: shaders pull from storage buffers. No blending.
+// Triangles; front faces are counter-clockwise as seen with +Y up. Depth is reversed: nearer is greater, the
+// test is GREATER_OR_EQUAL. No vertex buffers: shaders pull from storage buffers. No blending.
 struct RasterPipelineDesc {
   std::string name;
   Spirv vertex;

@@ -13,8 +13,12 @@
 namespace tessera::pvs {
 
 struct VisibilitySettings {
+  // Both off: every instance is drawn whole.
   bool frustum_culling = true;
   bool occlusion_culling = true;
+  // Pixels of determine()'s id buffers per pixel of its views, along each side, 0.25 to 4. More finds more of the
+  // triangles that are smaller than a pixel and flicker between views.
+  float resolution_scale = 1;
 };
 
 struct VisibilityStats {

@@ -8,7 +8,7 @@
 
 #include "atlas/placement.h"
 #include "base/frame_number.h"
-#include "geometry-compression/meta_frame.h"
+#include "geometry-compression/meta_codec.h"
 #include "scene/scene.h"
 
 namespace tessera::server {

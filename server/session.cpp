@@ -1,6 +1,8 @@
 #include "server/session.h"
 
+#include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "base/log.h"
 #include "codec/yuv_converter.h"
@@ -49,6 +51,8 @@ struct Session::Impl {
   bool first = true;
 
   std::vector<View> views;
+  std::vector<TimeNs> view_times;
+  DurationNs horizon_ns = 0;
   scene::VisiblePatches seen;
 
   Status set_up();
@@ -81,8 +85,13 @@ Status Session::Impl::set_up() {
 Status Session::Impl::find_visible(const FrameInput& input, FrameStats& stats) {
   const TimedPose& newest = input.poses.back();
   pvs::PredictionSettings prediction = settings.prediction;
-  prediction.horizon_ns = input.round_trip_ns + from_seconds(1.0 / settings.rate.frames_per_second);
+  horizon_ns = input.round_trip_ns + from_seconds(1.0 / settings.rate.frames_per_second);
+  prediction.horizon_ns = horizon_ns;
   views = pvs::predict_views(input.poses, newest.time_ns, settings.client_view, prediction);
+  view_times.clear();
+  for (size_t i = 0; i < views.size(); ++i) {
+    view_times.push_back(newest.time_ns + std::min<DurationNs>(static_cast<int64_t>(i) * prediction.step_ns, horizon_ns));
+  }
 
   instant->set(input.scene_time_ns, newest.pose.position);
   TESSERA_RETURN_IF_ERROR(scene->lighting().update(*instant));
@@ -158,6 +167,8 @@ StatusOr<Frame> Session::render(const FrameInput& input) {
 const FramePlan& Session::plan() const { return impl_->plan; }
 const std::string& Session::encoder() const { return impl_->encoder->choice(); }
 std::span<const View> Session::views() const { return impl_->views; }
+std::span<const TimeNs> Session::view_times() const { return impl_->view_times; }
+DurationNs Session::horizon_ns() const { return impl_->horizon_ns; }
 const scene::VisiblePatches& Session::seen() const { return impl_->seen; }
 std::span<const atlas::Placement> Session::placements() const { return impl_->layout->placements(); }
 const gpu::Image& Session::atlas_image() const { return impl_->gather->image(); }

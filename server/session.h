@@ -77,7 +77,9 @@ class Session {
   const std::string& encoder() const;  // which one runs, and why
 
   // State of the last rendered frame, for harnesses.
-  std::span<const View> views() const;                    // predicted
+  std::span<const View> views() const;         // predicted
+  std::span<const TimeNs> view_times() const;  // for when, on the clock of the poses
+  DurationNs horizon_ns() const;               // how far ahead they reach
   const scene::VisiblePatches& seen() const;              // in those views, without the patches that merely stay
   std::span<const atlas::Placement> placements() const;
   const gpu::Image& atlas_image() const;

@@ -1,0 +1,123 @@
+// tessera-bench: measures Tessera.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "base/log.h"
+#include "bench/file_io.h"
+#include "bench/loopback.h"
+#include "bench/report.h"
+#include "bench/version.h"
+
+namespace {
+
+using namespace tessera;
+
+enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
+
+constexpr char kFooter[] =
+    R"(Configuration: every option is also an environment variable (--delay-ms = TESSERA_BENCH_DELAY_MS) and a key
+of the --config file, under [loopback]. Flags win over the file, the file over the environment.
+
+Exit codes: 0 done, 1 the run failed, 2 wrong usage.)";
+
+constexpr char kLoopbackFooter[] = R"(Examples:
+  tessera-bench loopback --report report
+  tessera-bench loopback --scene sponza.glb --path sponza_1.csv --seconds 3 --json sponza.json --report report
+  tessera-bench loopback --delay-ms 100 --jitter-ms 10 --loss 0.01 --baselines none
+  tessera-bench loopback --codec none --pvs none --split off
+  tessera-bench loopback --scene city:1000000 --path city --estimate-only)";
+
+int report_failure(const Status& status) {
+  std::cerr << "tessera-bench: " << status.message() << std::endl;
+  return kFailed;
+}
+
+std::string command_line(const bench::LoopbackSettings& settings) {
+  std::string command = "tessera-bench loopback";
+  for (const std::string& flag : bench::to_flags(settings)) command += " " + flag;
+  return command;
+}
+
+Status write_outputs(const bench::LoopbackResult& result) {
+  if (!result.settings.json.empty()) {
+    TESSERA_RETURN_IF_ERROR(bench::write_file(result.settings.json, bench::to_json(result).dump(1) + "\n"));
+  }
+  if (result.settings.report.empty()) return absl::OkStatus();
+  TESSERA_RETURN_IF_ERROR(bench::write_run(result.settings.report, result).status());
+  TESSERA_RETURN_IF_ERROR(bench::write_report(result.settings.report));
+  std::cerr << "report: " << result.settings.report << "/index.html" << std::endl;
+  return absl::OkStatus();
+}
+
+void print_summary(const bench::LoopbackResult& result) {
+  std::cout << absl::StrFormat("%-14s %8s %8s %8s %9s %9s\n", "method", "mssim", "psnr", "holes", "Mbit/s",
+                               "violations");
+  for (const bench::Row& row : result.rows) {
+    const std::string holes = row.holes ? absl::StrFormat("%.4f%%", 100 * *row.holes) : "-";
+    std::cout << absl::StrFormat("%-14s %8.4f %8.2f %8s %9.2f %9d\n", row.method, row.error.mssim,
+                                 row.error.psnr, holes, row.mbps_total, row.violations);
+  }
+  for (const bench::SplitRow& row : result.split) {
+    std::cout << absl::StrFormat("without %-12s %.4f  (it adds %.4f)\n", row.cause, row.mssim, row.added);
+  }
+}
+
+int run_loopback(const bench::LoopbackSettings& settings) {
+  const SteadyClock clock;
+  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
+  StatusOr<bench::LoopbackResult> result = bench::run_loopback(settings, progress);
+  if (!result.ok()) return report_failure(result.status());
+  if (settings.estimate_only) return kOk;
+  result->settings = settings;
+  result->command = command_line(settings);
+  print_summary(*result);
+  const Status written = write_outputs(*result);
+  return written.ok() ? kOk : report_failure(written);
+}
+
+int run_report(const std::string& folder) {
+  const Status written = bench::write_report(folder);
+  if (!written.ok()) return report_failure(written);
+  std::cerr << "report: " << folder << "/index.html" << std::endl;
+  return kOk;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Measures Tessera: error, bit rate and run time of the whole chain.", "tessera-bench");
+  app.set_version_flag("--version", std::string("tessera-bench ") + bench::kCommit);
+  app.footer(kFooter);
+  app.require_subcommand(1);
+  app.set_config("--config", "", "read options from this TOML or INI file");
+  std::string log_level = "warn";
+  app.add_option("--log", log_level, "log level on standard error")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}))
+      ->envname("TESSERA_BENCH_LOG")
+      ->capture_default_str();
+
+  CLI::App* loopback = app.add_subcommand(
+      "loopback", "server → emulated network → client in virtual time, scored frame by frame");
+  bench::LoopbackSettings settings;
+  bench::add_options(*loopback, settings);
+  loopback->footer(kLoopbackFooter);
+  loopback->fallthrough();
+
+  CLI::App* report = app.add_subcommand("report", "one page from all runs in a folder");
+  std::string folder;
+  report->add_option("folder", folder, "where `loopback --report` left its runs")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  report->footer("Example:\n  tessera-bench report report");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? kOk : kUsage;
+  }
+  init_logging(log_level);
+  return loopback->parsed() ? run_loopback(settings) : run_report(folder);
+}

@@ -1,0 +1,246 @@
+#include "bench/report_page.h"
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "absl/strings/escaping.h"
+#include "base/status.h"
+#include "bench/image_io.h"
+#include "bench/report_plots.h"
+
+namespace tessera::bench {
+namespace {
+
+using nlohmann::json;
+
+constexpr char kHead[] = R"(<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>Tessera: measured runs</title>
+<style>
+:root { color-scheme: light dark; --text: #1d2329; --soft: #5b6670; --line: #d9dee3; --back: #ffffff; --bar: #0072b2; }
+@media (prefers-color-scheme: dark) {
+  :root { --text: #e4e8ec; --soft: #9aa5b0; --line: #39424b; --back: #14181c; --bar: #56b4e9; }
+}
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--text); background: var(--back); max-width: 78rem; margin: 2rem auto; padding: 0 1rem; }
+h1, h2, h3 { line-height: 1.2; } h2 { margin-top: 3rem; border-top: 1px solid var(--line); padding-top: 1.5rem; }
+.soft, figcaption { color: var(--soft); font-size: 0.9em; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; margin: 1rem 0; font-variant-numeric: tabular-nums; }
+th, td { padding: 0.25rem 0.7rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
+th:first-child, td:first-child { text-align: left; }
+th { font-weight: 600; color: var(--soft); }
+.bar { display: inline-block; height: 0.7em; background: var(--bar); }
+.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(34rem, 100%), 1fr)); gap: 1rem; }
+.triple { display: grid; grid-template-columns: repeat(3, 1fr); gap: 0.5rem; }
+figure { margin: 0; } img { max-width: 100%; display: block; border-radius: 4px; }
+.plots img { background: #fcfcfd; width: 100%; }
+code, pre { font-size: 0.88em; overflow-wrap: anywhere; white-space: pre-wrap; }
+</style>
+</head>
+<body>
+<h1>Tessera: measured runs</h1>
+)";
+
+std::string escape(absl::string_view text) {
+  std::string safe;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        safe += "&amp;";
+        break;
+      case '<':
+        safe += "&lt;";
+        break;
+      case '>':
+        safe += "&gt;";
+        break;
+      case '"':
+        safe += "&quot;";
+        break;
+      default:
+        safe += c;
+    }
+  }
+  return safe;
+}
+
+std::string data_uri(absl::string_view type, absl::string_view bytes) {
+  return absl::StrCat("data:", type, ";base64,", absl::Base64Escape(bytes));
+}
+
+std::string number(const json& object, const char* field, int decimals, double scale = 1) {
+  if (!object.contains(field) || !object[field].is_number()) return "–";
+  return absl::StrFormat("%.*f", decimals, object[field].get<double>() * scale);
+}
+
+struct Column {
+  const char* title;
+  const char* field;
+  int decimals;
+  double scale = 1;
+};
+
+constexpr Column kColumns[] = {{"MSSIM", "mssim", 4},
+                               {"DSSIM", "dssim", 4},
+                               {"PSNR dB", "psnr", 2},
+                               {"PSNR RGB", "psnr_rgb", 2},
+                               {"SSIM 7×7", "ssim7", 4},
+                               {"ΔE00 at borders", "delta_e_borders", 2},
+                               {"L∞", "linf", 3},
+                               {"holes %", "holes", 3, 100},
+                               {"coverage %", "coverage", 2, 100},
+                               {"overest. %", "overestimation", 1, 100},
+                               {"Mbit/s", "mbps_total", 2},
+                               {"atlas", "mbps_atlas", 2},
+                               {"meta", "mbps_meta", 2},
+                               {"frames", "frames_displayed", 0},
+                               {"stale", "frames_stale", 0},
+                               {"lost", "frames_lost", 0},
+                               {"violations", "violations", 0},
+                               {"server ms", "server_ms", 1},
+                               {"client ms", "client_ms", 1}};
+
+std::string rows_table(const json& rows) {
+  std::string html = "<div class=\"scroll\"><table><tr><th>method</th>";
+  for (const Column& column : kColumns) absl::StrAppend(&html, "<th>", column.title, "</th>");
+  html += "</tr>\n";
+  for (const json& row : rows) {
+    const std::string session = row.value("session", 0) ? absl::StrCat(" #", row["session"].get<int>()) : "";
+    absl::StrAppend(&html, "<tr><td>", escape(row.at("method").get<std::string>()), session, "</td>");
+    for (const Column& column : kColumns) {
+      absl::StrAppend(&html, "<td>", number(row, column.field, column.decimals, column.scale), "</td>");
+    }
+    html += "</tr>\n";
+  }
+  html += "</table></div>\n";
+  for (const json& row : rows) {
+    if (!row.contains("note")) continue;
+    absl::StrAppend(&html, "<p class=\"soft\">", escape(row.at("method").get<std::string>()), ": ",
+                    escape(row["note"].get<std::string>()), "</p>\n");
+  }
+  return html;
+}
+
+std::string split_table(const json& split) {
+  if (split.empty()) return "";
+  double largest = 1e-9;
+  for (const json& row : split) largest = std::max(largest, row.value("added", 0.0));
+  std::string html =
+      "<h3>Error by cause</h3>\n<table><tr><th>cause</th><th>MSSIM without it</th><th>PSNR dB</th><th>adds "
+      "to 1 − MSSIM</th>"
+      "<th></th></tr>\n";
+  for (const json& row : split) {
+    const double bar_rem = 12 * std::max(0.0, row.value("added", 0.0)) / largest;
+    absl::StrAppend(&html, "<tr><td>", escape(row.at("cause").get<std::string>()), "</td><td>",
+                    number(row, "mssim", 4), "</td><td>", number(row, "psnr", 2), "</td><td>",
+                    number(row, "added", 4),
+                    "</td><td style=\"text-align:left\"><span class=\"bar\" style=\"width:",
+                    absl::StrFormat("%.2f", bar_rem), "rem\"></span></td></tr>\n");
+  }
+  return html + "</table>\n";
+}
+
+std::string plots_html(const std::vector<Plot>& plots) {
+  std::string html = "<div class=\"plots\">\n";
+  for (const Plot& plot : plots) {
+    absl::StrAppend(&html, "<figure><figcaption>", escape(plot.title), "</figcaption>");
+    if (plot.svg.empty()) {
+      html +=
+          "<p class=\"soft\">No plot: it needs the program gnuplot (Debian package gnuplot-nox) and "
+          "data.</p>";
+    } else {
+      absl::StrAppend(&html, "<img alt=\"", escape(plot.title), "\" src=\"",
+                      data_uri("image/svg+xml", plot.svg), "\">");
+    }
+    html += "</figure>\n";
+  }
+  return html + "</div>\n";
+}
+
+// JPEG keeps the page small; the lossless files lie beside it.
+std::string picture_html(const std::filesystem::path& folder, const std::string& file,
+                         const std::string& caption) {
+  const auto image = read_png(folder / std::filesystem::path(file).filename());
+  if (!image.ok()) return absl::StrCat("<p class=\"soft\">", escape(image.status().message()), "</p>");
+  const std::vector<uint8_t> jpeg = encode_jpeg(*image);
+  const absl::string_view bytes(reinterpret_cast<const char*>(jpeg.data()), jpeg.size());
+  return absl::StrCat("<figure><img alt=\"", escape(caption), "\" src=\"", data_uri("image/jpeg", bytes),
+                      "\"><figcaption>", escape(caption), "</figcaption></figure>\n");
+}
+
+std::string pictures_html(const std::filesystem::path& folder, const json& pictures) {
+  if (pictures.empty()) return "";
+  const std::vector<uint8_t> legend = encode_png(dssim_legend(160, 10));
+  std::string html = absl::StrCat(
+      "<h3>Pictures</h3>\n<p class=\"soft\">DSSIM from 0 <img style=\"display:inline\" alt=\"colours of the "
+      "DSSIM map\" src=\"",
+      data_uri("image/png", absl::string_view(reinterpret_cast<const char*>(legend.data()), legend.size())),
+      "\"> to ", absl::StrFormat("%.2f", kDssimFullScale), " and above.</p>\n");
+  for (const json& picture : pictures) {
+    absl::StrAppend(&html, "<p><b>", escape(picture.at("label").get<std::string>()), "</b>, display frame ",
+                    picture.value("display_frame", 0), ", MSSIM ", number(picture, "mssim", 4),
+                    "</p>\n<div class=\"triple\">\n");
+    html += picture_html(folder, picture.at("truth").get<std::string>(), "truth");
+    html += picture_html(folder, picture.at("shown").get<std::string>(), "client");
+    html += picture_html(folder, picture.at("dssim").get<std::string>(), "DSSIM");
+    html += "</div>\n";
+  }
+  return html;
+}
+
+std::string details(absl::string_view title, absl::string_view text) {
+  if (text.empty()) return "";
+  return absl::StrCat("<details><summary>", title, "</summary><pre>", escape(text), "</pre></details>\n");
+}
+
+std::string settings_text(const json& settings) {
+  std::string text;
+  for (const auto& [name, value] : settings.items()) {
+    absl::StrAppend(&text, name, " = ", value.is_string() ? value.get<std::string>() : value.dump(), "\n");
+  }
+  return text;
+}
+
+std::string title_of(const json& run) {
+  const json& s = run.at("settings");
+  return absl::StrCat(std::filesystem::path(s.at("scene").get<std::string>()).stem().string(), ", ",
+                      s.at("size").get<std::string>(), ", atlas ", s.at("atlas").get<std::string>(), ", ",
+                      number(s, "bitrate-mbps", 1), " Mbit/s, ", number(s, "delay-ms", 0),
+                      " ms each way, codec ", s.at("codec").get<std::string>());
+}
+
+std::string run_html(const std::filesystem::path& folder, const json& run) {
+  const json &device = run.at("device"), &machine = run.at("machine");
+  std::string html = absl::StrCat(
+      "<h2>", escape(title_of(run)), "</h2>\n<p><code>", escape(run.value("command", std::string())),
+      "</code></p>\n<p class=\"soft\">commit ", escape(run.value("commit", std::string())), " · ",
+      escape(device.value("name", std::string())), " (", escape(device.value("driver", std::string())),
+      ") · ", escape(machine.value("cpu", std::string())), ", ", machine.value("cores", 0), " cores</p>\n");
+  html += rows_table(run.at("rows"));
+  for (const json& note : run.value("notes", json::array())) {
+    absl::StrAppend(&html, "<p class=\"soft\">", escape(note.get<std::string>()), "</p>\n");
+  }
+  html += split_table(run.at("split"));
+  html += plots_html(plot_run(run));
+  html += pictures_html(folder, run.value("pictures", json::array()));
+  html += details("Settings", settings_text(run.at("settings")));
+  html += details("Frame plan", run.value("plan", std::string()));
+  return html;
+}
+
+}  // namespace
+
+std::string report_page(const std::filesystem::path& folder, std::span<const json> runs) {
+  std::string html = kHead;
+  html +=
+      "<p class=\"soft\">The client's views beside the forward reference renderer. Means are over displayed "
+      "frames.</p>\n";
+  html += plots_html(plot_comparison(runs));
+  for (const json& run : runs) html += run_html(folder, run);
+  return html + "</body>\n</html>\n";
+}
+
+}  // namespace tessera::bench

@@ -1,0 +1,137 @@
+#include "bench/result.h"
+
+#include <sys/resource.h>
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "bench/version.h"
+
+namespace tessera::bench {
+namespace {
+
+using nlohmann::json;
+
+json to_json(const Percentiles& p) {
+  return {{"p50", p.p50}, {"p95", p.p95}, {"p99", p.p99}};
+}
+
+json to_json(const Row& row) {
+  json j{{"method", row.method},
+         {"session", row.session},
+         {"mssim", row.error.mssim},
+         {"dssim", row.error.dssim()},
+         {"psnr", row.error.psnr},
+         {"psnr_rgb", row.error.psnr_rgb},
+         {"ssim7", row.error.ssim7},
+         {"linf", row.error.linf},
+         {"l2", row.error.l2},
+         {"delta_e_borders", row.error.delta_e_borders},
+         {"mbps_total", row.mbps_total},
+         {"mbps_atlas", row.mbps_atlas},
+         {"mbps_meta", row.mbps_meta},
+         {"frames_displayed", row.frames_displayed},
+         {"frames_stale", row.frames_stale},
+         {"frames_lost", row.frames_lost},
+         {"violations", row.violations},
+         {"server_ms", row.server_ms},
+         {"client_ms", row.client_ms},
+         {"samples_shaded", row.samples_shaded},
+         {"peak_rss_mib", row.peak_rss_mib},
+         {"device_mib", row.device_mib}};
+  if (!row.note.empty()) j["note"] = row.note;
+  if (row.holes) j["holes"] = *row.holes;
+  if (row.coverage) j["coverage"] = *row.coverage;
+  if (row.overestimation) j["overestimation"] = *row.overestimation;
+  if (row.tiling_error_ms_max) j["tiling_error_ms_max"] = *row.tiling_error_ms_max;
+  if (row.end_to_end_ms) j["end_to_end_ms"] = to_json(*row.end_to_end_ms);
+  for (const auto& [name, p] : row.durations_ms) j["durations_ms"][name] = to_json(p);
+  return j;
+}
+
+json to_json(const SplitRow& row) {
+  return {{"cause", row.cause},
+          {"mssim", row.mssim},
+          {"dssim", (1 - row.mssim) / 2},
+          {"psnr", row.psnr},
+          {"added", row.added}};
+}
+
+json to_json(const FrameRecord& f) {
+  json j{{"time_ns", f.time_ns},         {"frame", f.frame},
+         {"age_ms", f.age_ms},           {"holes", f.holes},
+         {"atlas_bytes", f.atlas_bytes}, {"meta_bytes", f.meta_bytes}};
+  if (!f.mssim.empty()) j["mssim"] = f.mssim;
+  if (!f.psnr.empty()) j["psnr"] = f.psnr;
+  return j;
+}
+
+template <class T>
+json to_array(const std::vector<T>& values) {
+  json array = json::array();
+  for (const T& value : values) array.push_back(to_json(value));
+  return array;
+}
+
+std::string processor_name() {
+  std::ifstream in("/proc/cpuinfo");
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("model name")) return line.substr(std::min(line.size(), line.find(": ") + 2));
+  }
+  return "unknown";
+}
+
+}  // namespace
+
+Percentiles percentiles(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const auto at = [&values](double share) {
+    const double rank = share * static_cast<double>(values.size() - 1);
+    const auto below = static_cast<size_t>(rank);
+    const size_t above = std::min(below + 1, values.size() - 1);
+    return std::lerp(values[below], values[above], rank - static_cast<double>(below));
+  };
+  return {at(0.50), at(0.95), at(0.99)};
+}
+
+json to_json(const LoopbackResult& result) {
+  return {{"schema", kSchema},
+          {"command", result.command},
+          {"commit", kCommit},
+          {"machine", machine_json()},
+          {"device",
+           {{"name", result.device.name},
+            {"driver", result.device.driver},
+            {"software", result.device.software}}},
+          {"settings", to_json(result.settings)},
+          {"notes", result.notes},
+          {"plan", result.plan},
+          {"rows", to_array(result.rows)},
+          {"split", to_array(result.split)},
+          {"frames", to_array(result.frames)}};
+}
+
+json machine_json() {
+  utsname name{};
+  uname(&name);
+  const double mib =
+      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE)) / (1 << 20);
+  return {{"cpu", processor_name()},
+          {"cores", std::thread::hardware_concurrency()},
+          {"memory_mib", std::llround(mib)},
+          {"os", std::string(name.sysname) + " " + name.release}};
+}
+
+double peak_rss_mib() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;  // kilobytes on Linux
+}
+
+}  // namespace tessera::bench

@@ -1,0 +1,50 @@
+// The one drawing pass: every triangle of a SceneState from its record, textured with the atlas.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "base/view.h"
+#include "client-sdk/gles/atlas_texture.h"
+#include "client-sdk/gles/table_texture.h"
+#include "client-sdk/scene_state.h"
+
+namespace tessera::client::gles {
+
+class ScenePass {
+ public:
+  // `multisampled`: the target has several samples a pixel, so that alpha can become coverage.
+  static StatusOr<ScenePass> create(bool multisampled);
+
+  // Keeps a copy of the state on the device; uploads what changed.
+  Status set_state(const SceneState& state);
+  // Into the bound framebuffer, whose colour the caller has cleared; clears depth.
+  Status draw(const View& view, const AtlasTexture& atlas);
+
+ private:
+  static TableTexture record_table() {
+    return TableTexture({GL_RGBA32UI, GL_RGBA_INTEGER, GL_UNSIGNED_INT, sizeof(TriangleRecord)});
+  }
+
+  ScenePass() = default;
+  Status upload_transforms(const dvec3& eye);
+  mat4 clip_from_relative(const View& view) const;
+  void draw_group(RecordGroup group);
+
+  bool multisampled_ = false;
+  // Reversed depth straight from 0 to 1 (EXT_clip_control); otherwise the range -1 to 1 costs its precision.
+  bool reversed_depth_ = false;
+  Program program_;
+  GLint clip_from_relative_ = -1, atlas_size_ = -1, masked_ = -1;  // uniform locations
+  VertexArray no_attributes_;
+
+  uint32_t atlas_width_ = 0, atlas_height_ = 0;  // of the state; 0 before the first
+  std::vector<ObjectState> objects_;
+  std::vector<vec4> relative_;  // what transforms_ gets
+  TableTexture vertices_{{GL_RGB32F, GL_RGB, GL_FLOAT, sizeof(vec3)}};
+  TableTexture transforms_{{GL_RGBA32F, GL_RGBA, GL_FLOAT, sizeof(vec4)}};
+  std::array<TableTexture, kRecordGroups> records_{record_table(), record_table(), record_table(), record_table()};
+  std::array<GLsizei, kRecordGroups> record_counts_{};
+};
+
+}  // namespace tessera::client::gles

@@ -1,0 +1,171 @@
+#include "pvs/prediction.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tessera::pvs {
+namespace {
+
+// Longer than a pause between two poses of one motion.
+constexpr DurationNs kMaxGapNs = kNsPerSecond / 2;
+// Velocities are fitted over this time: one pair of poses is noisy (mice report in steps, poses are rounded).
+constexpr DurationNs kFitNs = 50 * kNsPerMs;
+// Faster pairs are teleports and snap turns, which say nothing about where the view goes next.
+constexpr double kMaxSpeedMps = 100;
+constexpr double kMaxAngularSpeed = 20;  // rad/s
+// Share of the predicted rotation by which it may be wrong.
+constexpr double kTurnUncertainty = 0.25;
+// Margins do not push a half angle past this (a pixel's share of the field shrinks with cos²): the views along a fast
+// turn cover what it sweeps.
+constexpr float kMaxHalfAngleRad = 1.2217305f;  // 70 degrees
+constexpr DurationNs kMaxViews = 64;
+
+// The rotation vector (axis times angle, at most pi) from `a` to `b` in the camera axes of `b`.
+dvec3 rotation_between(const dquat& a, const dquat& b) {
+  dquat d = glm::conjugate(a) * b;
+  if (d.w < 0) d = -d;
+  const dvec3 axis(d.x, d.y, d.z);
+  const double sine = glm::length(axis);
+  if (sine < 1e-12) return 2.0 * axis;
+  return axis * (2 * std::atan2(sine, d.w) / sine);
+}
+
+dquat rotation_by(const dvec3& vector) {
+  const double angle = glm::length(vector);
+  if (angle < 1e-12) return dquat(1, 0.5 * vector.x, 0.5 * vector.y, 0.5 * vector.z);
+  return glm::angleAxis(angle, vector / angle);
+}
+
+struct Motion {
+  dvec3 velocity{0};  // m/s
+  dvec3 turn{0};      // rad/s, camera axes
+};
+
+bool is_continuous(const TimedPose& a, const TimedPose& b) {
+  const DurationNs dt = b.time_ns - a.time_ns;
+  if (dt <= 0 || dt > kMaxGapNs) return false;
+  const double seconds = to_seconds(dt);
+  return glm::distance(a.pose.position, b.pose.position) <= kMaxSpeedMps * seconds &&
+         glm::length(rotation_between(a.pose.orientation, b.pose.orientation)) <= kMaxAngularSpeed * seconds;
+}
+
+// The poses, brought to unit quaternions, of the unbroken motion that ends with the newest pose; newest first.
+std::vector<TimedPose> newest_motion(std::span<const TimedPose> history) {
+  std::vector<TimedPose> out;
+  for (size_t i = history.size(); i-- > 0;) {
+    const TimedPose pose{history[i].time_ns, normalized(history[i].pose)};
+    if (!out.empty() && !is_continuous(pose, out.back())) break;
+    out.push_back(pose);
+    if (out.front().time_ns - pose.time_ns > 4 * kFitNs) break;
+  }
+  return out;
+}
+
+// Least squares over kFitNs before poses[from], through that pose; at least one pair. Constant motion comes out exactly.
+Motion fit(std::span<const TimedPose> poses, size_t from, size_t* last) {
+  Motion sum;
+  double weight = 0;
+  const TimedPose& newest = poses[from];
+  *last = from;
+  for (size_t i = from + 1; i < poses.size(); ++i) {
+    const DurationNs age = newest.time_ns - poses[i].time_ns;
+    if (i > from + 1 && age > kFitNs) break;
+    const double dt = to_seconds(age);
+    sum.velocity += dt * (newest.pose.position - poses[i].pose.position);
+    sum.turn += dt * rotation_between(poses[i].pose.orientation, newest.pose.orientation);
+    weight += dt * dt;
+    *last = i;
+  }
+  if (weight > 0) {
+    sum.velocity /= weight;
+    sum.turn /= weight;
+  }
+  return sum;
+}
+
+struct Prediction {
+  TimedPose newest;
+  Motion motion;
+  dvec3 turn_change{0};  // |angular acceleration| by camera axis, rad/s²
+};
+
+Prediction predict(std::span<const TimedPose> history, TimeNs now_ns) {
+  const std::vector<TimedPose> poses = newest_motion(history);
+  Prediction out{.newest = poses.front()};
+  const DurationNs age = now_ns - out.newest.time_ns;
+  if (poses.size() < 2 || age < 0 || age > kMaxGapNs) return out;
+  size_t middle = 0, last = 0;
+  out.motion = fit(poses, 0, &middle);
+  if (middle + 1 < poses.size()) {
+    const Motion before = fit(poses, middle, &last);
+    const double between = 0.5 * to_seconds(poses[0].time_ns - poses[last].time_ns);  // the middles of the two fits
+    out.turn_change = glm::abs(out.motion.turn - before.turn) / between;
+  }
+  return out;
+}
+
+// Widens one side of the field by the margin, but not past kMaxHalfAngleRad.
+float allowed(float margin, float half_angle) { return std::clamp(kMaxHalfAngleRad - half_angle, 0.0f, margin); }
+
+View with_margin(const View& client, const Prediction& prediction, double ahead_s, const PredictionSettings& settings) {
+  const float half_width = 0.5f * client.fov.width_rad(), half_height = 0.5f * client.fov.height_rad();
+  const dvec3 error = kTurnUncertainty * glm::abs(prediction.motion.turn) * ahead_s +
+                      0.5 * prediction.turn_change * ahead_s * ahead_s;
+  // A roll moves the sides by the other axis' half field.
+  const double x = settings.base_margin * half_width + error.y + error.z * half_height;
+  const double y = settings.base_margin * half_height + error.x + error.z * half_width;
+  const float max_margin = std::max(0.0f, settings.max_margin_rad);
+  const float margin_x = std::clamp(static_cast<float>(x), 0.0f, max_margin);
+  const float margin_y = std::clamp(static_cast<float>(y), 0.0f, max_margin);
+
+  const float widest_x = std::max(std::abs(std::atan(client.fov.left)), std::abs(std::atan(client.fov.right)));
+  const float widest_y = std::max(std::abs(std::atan(client.fov.down)), std::abs(std::atan(client.fov.up)));
+  View view = client;
+  view.fov = client.fov.widened(allowed(margin_x, widest_x), allowed(margin_y, widest_y));
+  const float grow_x = (view.fov.right - view.fov.left) / (client.fov.right - client.fov.left);
+  const float grow_y = (view.fov.up - view.fov.down) / (client.fov.up - client.fov.down);
+  // Less a little, so that a view without margin keeps its size.
+  view.width = static_cast<uint32_t>(std::ceil(static_cast<float>(client.width) * grow_x - 0.01f));
+  view.height = static_cast<uint32_t>(std::ceil(static_cast<float>(client.height) * grow_y - 0.01f));
+  return view;
+}
+
+View view_at(const View& client, const Prediction& prediction, double ahead_s, const PredictionSettings& settings) {
+  View view = with_margin(client, prediction, ahead_s, settings);
+  view.pose.position = prediction.newest.pose.position + prediction.motion.velocity * ahead_s;
+  view.pose.orientation = glm::normalize(prediction.newest.pose.orientation * rotation_by(prediction.motion.turn * ahead_s));
+  return view;
+}
+
+// Times after `now_ns`: every step, and always the horizon.
+std::vector<DurationNs> steps(const PredictionSettings& settings) {
+  std::vector<DurationNs> out;
+  const DurationNs horizon = std::max<DurationNs>(0, settings.horizon_ns);
+  const DurationNs step = std::max({settings.step_ns, horizon / kMaxViews, DurationNs{1}});
+  // A last step shorter than a tenth of one is not worth a view.
+  for (DurationNs t = step; t < horizon - step / 10; t += step) out.push_back(t);
+  if (horizon > 0) out.push_back(horizon);
+  return out;
+}
+
+}  // namespace
+
+std::vector<View> predict_views(std::span<const TimedPose> history, TimeNs now_ns, const View& client_view,
+                                const PredictionSettings& settings) {
+  if (settings.mode == PredictionMode::none) {
+    View view = client_view;
+    view.pose = normalized(history.back().pose);
+    return {view};
+  }
+  const Prediction prediction = predict(history, now_ns);
+  // A pose from before `now_ns` (it travelled) is extrapolated from its own time; a clock that jumped back adds nothing.
+  const DurationNs age = std::clamp<DurationNs>(now_ns - prediction.newest.time_ns, 0, kMaxGapNs);
+  std::vector<View> views{view_at(client_view, prediction, 0, settings)};
+  if (2 * age > settings.step_ns) views.push_back(view_at(client_view, prediction, to_seconds(age), settings));
+  for (const DurationNs t : steps(settings)) {
+    views.push_back(view_at(client_view, prediction, to_seconds(age + t), settings));
+  }
+  return views;
+}
+
+}  // namespace tessera::pvs

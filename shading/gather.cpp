@@ -1,0 +1,183 @@
+#include "shading/gather.h"
+
+#include <algorithm>
+
+#include "shading/features.h"
+#include "shading/gather_work.h"
+#include "shading/growing_buffer.h"
+#include "shading/shaders/gather.comp.spv.h"
+#include "shading/shaders/gather.frag.spv.h"
+#include "shading/shaders/gather.vert.spv.h"
+
+namespace tessera::shading {
+namespace {
+
+constexpr gpu::Format kAtlasFormat = gpu::Format::rgba8_srgb;
+// Linear value of sRGB 128; alpha 0 marks texels that were never used.
+constexpr std::array<float, 4> kMidGrey{0.2158605f, 0.2158605f, 0.2158605f, 0};
+constexpr uint32_t kMaxGroupsX = 32768;  // Vulkan guarantees 65535
+
+enum GatherBinding : uint32_t { kBlocks, kStarts, kColors, kAtlas };
+
+// Pass in shading/shaders/gather.glsl.
+struct PassPush {
+  vec4 eye;
+  uint32_t size[4];
+};
+
+uint64_t raster_from_texels(GatherPath path) {
+  switch (path) {
+    case GatherPath::compute: return ~uint64_t{0};
+    case GatherPath::raster: return 0;
+    case GatherPath::automatic: break;
+  }
+  return 16 * 16;
+}
+
+}  // namespace
+
+struct Gather::Impl {
+  gpu::Device& device;
+  const scene::GpuScene& scene;
+  const Lighting& lighting;
+  GatherSettings settings;
+  gpu::BindLayout layout;
+  gpu::BindGroup group;
+  gpu::ComputePipeline compute;
+  gpu::RasterPipeline raster;
+  gpu::Image image;
+  gpu::Buffer blocks, starts, colors;
+  uint32_t color_count = 0;
+  mutable GatherStats stats;
+
+  Status create();
+  Status create_pipelines();
+  Status upload(const GatherWork& work);
+  Status fit(uint32_t binding, gpu::Buffer& buffer, uint64_t bytes, gpu::Memory memory);
+  void record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, const vec4& eye,
+                      const GatherWork& work);
+  void record_raster(gpu::Commands& commands, const scene::SceneInstant& instant, const vec4& eye,
+                     const GatherWork& work);
+};
+
+Status Gather::Impl::create() {
+  constexpr gpu::Binding kBindings[] = {{kBlocks, gpu::BindingKind::storage_buffer},
+                                        {kStarts, gpu::BindingKind::storage_buffer},
+                                        {kColors, gpu::BindingKind::storage_buffer},
+                                        {kAtlas, gpu::BindingKind::storage_image}};
+  if (settings.width == 0 || settings.height == 0 || settings.width > 65536 || settings.height > 65536)
+    return absl::InvalidArgumentError(
+        absl::StrFormat("gather: atlas of %ux%u texels, each side must be 1..65536", settings.width, settings.height));
+  TESSERA_ASSIGN_OR_RETURN(layout, gpu::BindLayout::create(device, kBindings));
+  TESSERA_ASSIGN_OR_RETURN(group, gpu::BindGroup::create(device, layout));
+  const gpu::ImageDesc desc{
+      .width = settings.width, .height = settings.height, .format = kAtlasFormat, .storage = true};
+  TESSERA_ASSIGN_OR_RETURN(image, gpu::Image::create(device, desc, "atlas"));
+  group.set(kAtlas, image);
+  TESSERA_RETURN_IF_ERROR(upload({}));
+  TESSERA_RETURN_IF_ERROR(create_pipelines());
+  gpu::Commands commands = device.begin();
+  commands.clear(image, kMidGrey);
+  commands.barrier();
+  return device.run(std::move(commands));
+}
+
+Status Gather::Impl::create_pipelines() {
+  const std::vector<const gpu::BindLayout*> layouts{&scene.layout(), &scene.instant_layout(), &lighting.layout(),
+                                                    &layout};
+  std::vector<gpu::Constant> constants = scene.constants();
+  for (const gpu::Constant& c : lighting.constants()) constants.push_back(c);
+  // Single colours are computed on every path.
+  TESSERA_ASSIGN_OR_RETURN(compute, gpu::ComputePipeline::create(device, {.name = "gather compute",
+                                                                          .shader = gather_comp,
+                                                                          .layouts = layouts,
+                                                                          .push_bytes = sizeof(PassPush),
+                                                                          .constants = constants}));
+  if (settings.path == GatherPath::compute) return absl::OkStatus();
+  TESSERA_ASSIGN_OR_RETURN(raster, gpu::RasterPipeline::create(device, {.name = "gather raster",
+                                                                        .vertex = gather_vert,
+                                                                        .fragment = gather_frag,
+                                                                        .layouts = layouts,
+                                                                        .push_bytes = sizeof(PassPush),
+                                                                        .constants = constants,
+                                                                        .colors = {kAtlasFormat}}));
+  return absl::OkStatus();
+}
+
+Status Gather::Impl::fit(uint32_t binding, gpu::Buffer& buffer, uint64_t bytes, gpu::Memory memory) {
+  TESSERA_ASSIGN_OR_RETURN(const bool is_new, grow(device, buffer, bytes, memory, "gather"));
+  if (is_new) group.set(binding, buffer);
+  return absl::OkStatus();
+}
+
+Status Gather::Impl::upload(const GatherWork& work) {
+  TESSERA_RETURN_IF_ERROR(
+      fit(kBlocks, blocks, work.blocks.size() * sizeof(BlockRecord), gpu::Memory::upload));
+  TESSERA_RETURN_IF_ERROR(fit(kStarts, starts, work.starts.size() * sizeof(uint32_t), gpu::Memory::upload));
+  TESSERA_RETURN_IF_ERROR(fit(kColors, colors, work.colors * sizeof(uint32_t), gpu::Memory::readback));
+  write<BlockRecord>(blocks, work.blocks);
+  write<uint32_t>(starts, work.starts);
+  color_count = work.colors;
+  stats = {.samples = work.compute_samples + work.raster_samples,
+           .color_samples = work.colors,
+           .raster_blocks = work.raster_blocks,
+           .compute_blocks = work.compute_blocks};
+  return absl::OkStatus();
+}
+
+void Gather::Impl::record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, const vec4& eye,
+                                  const GatherWork& work) {
+  const auto chunks = static_cast<uint32_t>(work.starts.size());
+  if (chunks == 0) return;
+  commands.bind(compute, {&scene.group(), &instant.group(), &lighting.group(), &group});
+  commands.push(PassPush{eye, {chunks, 0, 0, 0}});
+  const uint32_t groups_x = std::min(chunks, kMaxGroupsX);
+  commands.dispatch(groups_x, (chunks + groups_x - 1) / groups_x);
+}
+
+void Gather::Impl::record_raster(gpu::Commands& commands, const scene::SceneInstant& instant, const vec4& eye,
+                                 const GatherWork& work) {
+  if (work.batches.empty()) return;
+  const gpu::ColorAttachment atlas{.image = &image};
+  commands.begin_rendering({.colors = {&atlas, 1}, .width = settings.width, .height = settings.height});
+  commands.bind(raster, {&scene.group(), &instant.group(), &lighting.group(), &group});
+  commands.push(PassPush{eye, {settings.width, settings.height, 0, 0}});
+  for (const RasterBatch& batch : work.batches) commands.draw(6, batch.block_count, 0, batch.first_block);
+  commands.end_rendering();
+}
+
+Gather::Gather(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Gather::~Gather() = default;
+
+StatusOr<std::unique_ptr<Gather>> Gather::create(gpu::Device& device, const scene::GpuScene& scene,
+                                                 const Lighting& lighting, const GatherSettings& settings) {
+  auto impl = std::unique_ptr<Impl>(
+      new Impl{.device = device, .scene = scene, .lighting = lighting, .settings = settings});
+  TESSERA_RETURN_IF_ERROR(impl->create());
+  return std::unique_ptr<Gather>(new Gather(std::move(impl)));
+}
+
+Status Gather::record(gpu::Commands& commands, const scene::SceneInstant& instant, const dvec3& eye,
+                      std::span<const atlas::Placement> placements) {
+  const GatherLimits limits{impl_->settings.width, impl_->settings.height, raster_from_texels(impl_->settings.path)};
+  TESSERA_ASSIGN_OR_RETURN(const GatherWork work, build_gather_work(impl_->scene, placements, limits));
+  TESSERA_RETURN_IF_ERROR(impl_->upload(work));
+  const vec4 relative_eye(vec3(eye - instant.origin()), 1);
+  commands.begin_interval("gather");
+  impl_->record_compute(commands, instant, relative_eye, work);
+  impl_->record_raster(commands, instant, relative_eye, work);
+  commands.barrier();
+  commands.end_interval();
+  return absl::OkStatus();
+}
+
+std::span<const uint32_t> Gather::colors() const { return impl_->colors.as<const uint32_t>().first(impl_->color_count); }
+const gpu::Image& Gather::image() const { return impl_->image; }
+
+const GatherStats& Gather::stats() const {
+  for (const auto& interval : impl_->device.intervals())
+    if (interval.name == "gather") impl_->stats.gpu_ms = interval.ms;
+  return impl_->stats;
+}
+
+}  // namespace tessera::shading

@@ -1,0 +1,50 @@
+// A frame's placements as the gather shaders want them: sorted by material, cut into chunks.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "atlas/placement.h"
+#include "base/status.h"
+#include "scene/gpu_scene.h"
+
+namespace tessera::shading {
+
+// Block in shading/shaders/gather.glsl.
+struct BlockRecord {
+  uint32_t instance;
+  uint32_t first_triangle;  // of the patch, in GpuScene::indices() / 3
+  uint32_t place;           // x | y << 16 in texels; or the slot of a single colour
+  uint32_t shape;           // log_w | log_h << 4 | triangle count << 8 | flags
+  uint32_t first_sample;    // compute path
+};
+static_assert(sizeof(BlockRecord) == 20);
+constexpr uint32_t kBlockTransposed = 1u << 10, kBlockMasked = 1u << 11, kBlockColor = 1u << 12;
+
+constexpr uint32_t kChunkSamples = 64;  // local size of gather.comp
+
+// Blocks of one material that follow each other: one raster draw.
+struct RasterBatch {
+  uint32_t first_block, block_count;
+};
+
+struct GatherWork {
+  // Compute blocks, a sentinel that no sample reaches, then raster blocks.
+  std::vector<BlockRecord> blocks;
+  std::vector<uint32_t> starts;  // by chunk of kChunkSamples samples of one material: its first block
+  std::vector<RasterBatch> batches;
+  uint64_t compute_samples = 0, raster_samples = 0;  // shaded, without padding
+  uint32_t colors = 0, compute_blocks = 0, raster_blocks = 0;
+};
+
+struct GatherLimits {
+  uint32_t width, height;        // of the atlas
+  uint64_t raster_from_texels;   // blocks of at least so many texels go to the raster path
+};
+
+// InvalidArgument if a placement names no patch of the scene or leaves the atlas.
+StatusOr<GatherWork> build_gather_work(const scene::GpuScene& scene, std::span<const atlas::Placement> placements,
+                                       const GatherLimits& limits);
+
+}  // namespace tessera::shading

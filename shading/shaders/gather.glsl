@@ -1,0 +1,115 @@
+// Samples of placed patches. Reads: sets 0, 1, 2 and the blocks of set 3 (Gather). C++ twin: shading/gather_work.h.
+#ifndef TESSERA_GATHER_GLSL
+#define TESSERA_GATHER_GLSL
+
+#include "shading/shaders/material.glsl"
+
+struct Block {
+  uint instance;
+  uint first_triangle;  // of the patch, in the index buffer / 3
+  uint place;           // x | y << 16 in texels; or the slot of a single colour
+  uint shape;           // log_w | log_h << 4 | triangle count << 8 | flags
+  uint first_sample;    // compute path: of the whole dispatch
+};
+const uint kBlockTransposed = 1u << 10, kBlockMasked = 1u << 11, kBlockColor = 1u << 12;
+
+layout(set = 3, binding = 0, std430) readonly buffer Blocks { Block blocks[]; };
+
+layout(push_constant) uniform Pass {
+  vec4 eye;  // relative to the instant's origin
+  uvec4 size;  // raster: of the atlas; compute: x = chunks
+} pass;
+
+uvec2 block_size(uint shape) { return uvec2(1u << (shape & 15u), 1u << ((shape >> 4) & 15u)); }
+
+// The block's corners of a triangle (scene::patch_corner).
+struct Corners {
+  vec2 c0, c1, c2;
+};
+
+Corners block_corners(uint count, uint triangle) {
+  if (count < 3u)
+    return triangle == 0u ? Corners(vec2(0, 0), vec2(1, 0), vec2(0, 1))
+                          : Corners(vec2(1, 1), vec2(0, 1), vec2(1, 0));
+  vec2 tip = vec2(0.5, 1);
+  if (triangle == 0u) return Corners(vec2(0, 0), vec2(1, 0), tip);
+  return triangle == 1u ? Corners(vec2(0, 1), vec2(0, 0), tip) : Corners(vec2(1, 0), vec2(1, 1), tip);
+}
+
+// Which triangle of the patch holds block position `at`, for a block that spans `extent` and has its tip at `tip_u`.
+uint triangle_at(uint count, vec2 at, vec2 extent, float tip_u) {
+  if (count == 1u) return 0u;
+  if (count == 2u) return at.x * extent.y + at.y * extent.x <= extent.x * extent.y ? 0u : 1u;
+  if (at.x * extent.y < at.y * tip_u) return 1u;
+  return (extent.x - at.x) * extent.y < at.y * (extent.x - tip_u) ? 2u : 0u;
+}
+
+// `at` = position along the patch's u and v axes in texels, `extent` = the far corner's. Corners sit at whole texels
+// (atlas/placement.h), so the tip of three triangles may lie half a texel off the middle.
+TrianglePoint block_point(uint count, vec2 at, vec2 extent, out uint triangle) {
+  if (count == 1u) {  // the half that the triangle leaves unused repeats its long edge
+    float excess = at.x / extent.x + at.y / extent.y - 1.0;
+    if (excess > 0.0) at -= 0.5 * excess * extent;
+  }
+  triangle = triangle_at(count, at, extent, floor(0.5 * extent.x + 0.5));
+  Corners c = block_corners(count, triangle);
+  vec2 a = floor(c.c0 * extent + 0.5);
+  vec2 e1 = floor(c.c1 * extent + 0.5) - a, e2 = floor(c.c2 * extent + 0.5) - a;
+  float det = e1.x * e2.y - e1.y * e2.x;
+  float inverse = det != 0.0 ? 1.0 / det : 0.0;  // two texels cannot hold three triangles
+  vec2 d = at - a;
+  TrianglePoint p;
+  p.weights = vec2(d.x * e2.y - d.y * e2.x, e1.x * d.y - e1.y * d.x) * inverse;
+  p.ddx = vec2(e2.y, -e1.y) * inverse;
+  p.ddy = vec2(-e2.x, e1.x) * inverse;
+  p.weights = clamp(p.weights, 0.0, 1.0);
+  return p;
+}
+
+// Coverage as it travels in the atlas: 0.5 at the cut-off, full swing a quarter of alpha to either side. Steep enough
+// that coding noise moves an edge little, soft enough that bilinear filtering places it between texels.
+float coverage(float alpha, float cutoff) { return clamp(0.5 + 2.0 * (alpha - cutoff), 0.0, 1.0); }
+
+// Display-linear colour of one texel of a block; `texel` counts from its upper left corner. A single colour is the
+// block's centre, filtered over the patch.
+vec3 block_texel(Block block, uvec2 texel) {
+  uvec2 size = block_size(block.shape);
+  bool is_coverage = false;
+  if ((block.shape & kBlockMasked) != 0u) {
+    if (size.x > size.y) {
+      size.x >>= 1;
+      is_coverage = texel.x >= size.x;
+      texel.x -= is_coverage ? size.x : 0u;
+    } else {
+      size.y >>= 1;
+      is_coverage = texel.y >= size.y;
+      texel.y -= is_coverage ? size.y : 0u;
+    }
+  }
+  uint count = (block.shape >> 8) & 3u;
+  vec2 at = vec2(texel), extent = vec2(size) - 1.0;
+  // A side of one texel stands for the middle of its axis.
+  if (extent.x < 0.5) { extent.x = 1.0; at.x = 0.5; }
+  if (extent.y < 0.5) { extent.y = 1.0; at.y = 0.5; }
+  if ((block.shape & kBlockTransposed) != 0u) {
+    at = at.yx;
+    extent = extent.yx;
+  }
+  float footprint = 1.0;
+  if ((block.shape & kBlockColor) != 0u) {
+    extent = vec2(2.0);
+    at = count == 1u ? vec2(2.0 / 3.0) : vec2(1.0);
+    footprint = 2.0;
+  }
+  uint triangle;
+  TrianglePoint point = block_point(count, at, extent, triangle);
+  point.ddx *= footprint;
+  point.ddy *= footprint;
+  Triangle t = fetch_triangle(block.instance, block.first_triangle + triangle);
+  SurfacePoint p = surface_point(block.instance, t, point);
+  vec4 base = base_color(p);
+  if (is_coverage) return vec3(srgb_decode(coverage(base.a, materials[p.material].alpha_cutoff)));
+  return shade(p, base.rgb, pass.eye.xyz);
+}
+
+#endif

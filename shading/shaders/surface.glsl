@@ -1,0 +1,119 @@
+// A point of a triangle with all that shading asks about it. Reads: set 0 and 1 (scene.glsl).
+#ifndef TESSERA_SURFACE_GLSL
+#define TESSERA_SURFACE_GLSL
+
+#include "scene/shaders/scene.glsl"
+#include "shading/shaders/brdf.glsl"
+#include "shading/shaders/features.glsl"
+
+struct Triangle {
+  uint v0, v1, v2;    // in vertices[]
+  vec3 a, edge1, edge2;  // first corner and the edges from it, relative to the instant's origin
+};
+
+// A place in a triangle: weights of its second and third corner, and how these change along the two axes of the
+// sampling grid (pixels or texels).
+struct TrianglePoint {
+  vec2 weights, ddx, ddy;
+};
+
+struct SurfacePoint {
+  vec3 position;          // relative to the instant's origin
+  vec3 geometric_normal;  // unit, out of the front face
+  vec3 normal;            // unit, interpolated
+  vec4 tangent;           // world direction, w = handedness; zero without normal maps
+  vec2 uv0, uv1;
+  vec4 uv0_gradient, uv1_gradient;  // ddx, ddy
+  vec4 color;
+  uint material;
+};
+
+// `triangle`: in the index buffer / 3.
+Triangle fetch_triangle(uint instance, uint triangle) {
+  Triangle t;
+  t.v0 = indices[3 * triangle];
+  t.v1 = indices[3 * triangle + 1];
+  t.v2 = indices[3 * triangle + 2];
+  // Edges before the transform: the translation would cost them precision.
+  vec3 a = vertex_position(t.v0);
+  t.a = to_relative(instance, a);
+  t.edge1 = direction_to_world(instance, vertex_position(t.v1) - a);
+  t.edge2 = direction_to_world(instance, vertex_position(t.v2) - a);
+  return t;
+}
+
+vec3 interpolate_normal(Triangle t, vec2 w) {
+  vec3 n0 = vec3(vertices[t.v0].nx, vertices[t.v0].ny, vertices[t.v0].nz);
+  vec3 n1 = vec3(vertices[t.v1].nx, vertices[t.v1].ny, vertices[t.v1].nz);
+  vec3 n2 = vec3(vertices[t.v2].nx, vertices[t.v2].ny, vertices[t.v2].nz);
+  return n0 + w.x * (n1 - n0) + w.y * (n2 - n0);
+}
+
+vec4 interpolate_tangent(Triangle t, vec2 w) {
+  vec3 t0 = vec3(vertices[t.v0].tx, vertices[t.v0].ty, vertices[t.v0].tz);
+  vec3 t1 = vec3(vertices[t.v1].tx, vertices[t.v1].ty, vertices[t.v1].tz);
+  vec3 t2 = vec3(vertices[t.v2].tx, vertices[t.v2].ty, vertices[t.v2].tz);
+  return vec4(t0 + w.x * (t1 - t0) + w.y * (t2 - t0), vertices[t.v0].tw);
+}
+
+vec4 interpolate_color(Triangle t, vec2 w) {
+  vec4 c0 = unpackUnorm4x8(vertices[t.v0].color);
+  vec4 c1 = unpackUnorm4x8(vertices[t.v1].color);
+  vec4 c2 = unpackUnorm4x8(vertices[t.v2].color);
+  return c0 + w.x * (c1 - c0) + w.y * (c2 - c0);
+}
+
+// uv, then its two derivatives, of one texture coordinate set.
+void set_uv0(inout SurfacePoint p, Triangle t, TrianglePoint at) {
+  vec2 a = vec2(vertices[t.v0].u0, vertices[t.v0].v0);
+  vec2 e1 = vec2(vertices[t.v1].u0, vertices[t.v1].v0) - a;
+  vec2 e2 = vec2(vertices[t.v2].u0, vertices[t.v2].v0) - a;
+  p.uv0 = a + at.weights.x * e1 + at.weights.y * e2;
+  p.uv0_gradient = vec4(at.ddx.x * e1 + at.ddx.y * e2, at.ddy.x * e1 + at.ddy.y * e2);
+}
+
+void set_uv1(inout SurfacePoint p, Triangle t, TrianglePoint at) {
+  vec2 a = vec2(vertices[t.v0].u1, vertices[t.v0].v1);
+  vec2 e1 = vec2(vertices[t.v1].u1, vertices[t.v1].v1) - a;
+  vec2 e2 = vec2(vertices[t.v2].u1, vertices[t.v2].v1) - a;
+  p.uv1 = a + at.weights.x * e1 + at.weights.y * e2;
+  p.uv1_gradient = vec4(at.ddx.x * e1 + at.ddx.y * e2, at.ddy.x * e1 + at.ddy.y * e2);
+}
+
+// What texture lookups need, and no more: alpha tests stop here.
+SurfacePoint texture_point(uint instance, Triangle t, TrianglePoint at) {
+  SurfacePoint p;
+  p.material = instances[instance].material;
+  p.position = t.a + at.weights.x * t.edge1 + at.weights.y * t.edge2;
+  set_uv0(p, t, at);
+  p.uv1 = vec2(0.0);
+  p.uv1_gradient = vec4(0.0);
+  if (kSecondTexcoord) set_uv1(p, t, at);
+  p.color = vec4(1.0);
+  if (kVertexColors) p.color = interpolate_color(t, at.weights);
+  p.geometric_normal = vec3(0.0);
+  p.normal = vec3(0.0);
+  p.tangent = vec4(0.0);
+  return p;
+}
+
+SurfacePoint surface_point(uint instance, Triangle t, TrianglePoint at) {
+  SurfacePoint p = texture_point(instance, t, at);
+  float side = is_mirrored(instance) ? -1.0 : 1.0;
+  vec3 interpolated = normal_to_world(instance, interpolate_normal(t, at.weights));
+  // Scaled, so that neither a crumb's nor a planet's cross product leaves the range of float.
+  vec3 reach = max(abs(t.edge1), abs(t.edge2));
+  float scale = 1.0 / clamp(max(reach.x, max(reach.y, reach.z)), 1e-18, 1e18);
+  vec3 winding = side * cross(t.edge1 * scale, t.edge2 * scale);
+  // Vertex normals that cancel out, or a triangle without area: each stands in for the other.
+  vec3 unit = safe_normalize(interpolated, vec3(0.0, 1.0, 0.0));
+  p.geometric_normal = safe_normalize(winding, unit);
+  p.normal = safe_normalize(interpolated, p.geometric_normal);
+  if (kNormalMaps) {
+    vec4 tangent = interpolate_tangent(t, at.weights);
+    p.tangent = vec4(direction_to_world(instance, tangent.xyz), side * tangent.w);
+  }
+  return p;
+}
+
+#endif

@@ -1,0 +1,34 @@
+// One camera of a forward pass. Reads: set 3 (ReferenceRenderer) and the draw's push constant.
+#ifndef TESSERA_VIEW_GLSL
+#define TESSERA_VIEW_GLSL
+
+#include "shading/shaders/surface.glsl"
+
+layout(set = 3, binding = 0, std430) readonly buffer ViewRecord {
+  mat4 clip_from_relative;
+  vec4 eye;  // relative to the instant's origin
+  // The ray through framebuffer position (x, y), in pixels from the upper left: ray_0 + x ray_x + y ray_y, of length 1
+  // along the view's axis.
+  vec4 ray_0, ray_x, ray_y;
+} view;
+
+layout(push_constant) uniform Draw { uint first_triangle; } draw;  // in the index buffer / 3
+
+// Where the ray through `pixel` meets the triangle's plane (Möller-Trumbore), and the exact derivatives of the weights
+// over whole pixels. Clamped to the triangle: rounding at an edge-on triangle must not reach outside it.
+TrianglePoint triangle_point(Triangle t, vec2 pixel) {
+  vec3 ray = view.ray_0.xyz + pixel.x * view.ray_x.xyz + pixel.y * view.ray_y.xyz;
+  vec3 to_eye = view.eye.xyz - t.a;
+  vec3 p = cross(t.edge2, to_eye), q = cross(to_eye, t.edge1), n = cross(t.edge2, t.edge1);
+  float det = dot(ray, n);
+  float inverse = abs(det) > 1e-30 ? 1.0 / det : 0.0;
+  vec2 w = vec2(dot(ray, p), dot(ray, q)) * inverse;
+  TrianglePoint at;
+  at.ddx = (vec2(dot(view.ray_x.xyz, p), dot(view.ray_x.xyz, q)) - w * dot(view.ray_x.xyz, n)) * inverse;
+  at.ddy = (vec2(dot(view.ray_y.xyz, p), dot(view.ray_y.xyz, q)) - w * dot(view.ray_y.xyz, n)) * inverse;
+  w.x = clamp(w.x, 0.0, 1.0);
+  at.weights = vec2(w.x, clamp(w.y, 0.0, 1.0 - w.x));
+  return at;
+}
+
+#endif

@@ -1,0 +1,97 @@
+#include "include_graph.h"
+
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <sstream>
+
+namespace tessera::architecture {
+
+std::string read_text(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::vector<std::string> includes_of(const std::string& text) {
+  static const std::regex line("^[ \t]*#[ \t]*include[ \t]*[<\"]([^>\"]+)[>\"]", std::regex::multiline);
+  std::vector<std::string> found;
+  for (std::sregex_iterator match(text.begin(), text.end(), line), end; match != end; ++match) {
+    found.push_back((*match)[1]);
+  }
+  return found;
+}
+
+Rules parse_rules(const std::string& rooms_cmake) {
+  static const std::regex line("^set\\(TESSERA_(ROOMS|MAY_USE_([a-z-]+))([^)]*)\\)", std::regex::multiline);
+  Rules rules;
+  std::set<std::string> all;
+  for (std::sregex_iterator match(rooms_cmake.begin(), rooms_cmake.end(), line), end; match != end; ++match) {
+    std::istringstream words((*match)[3]);
+    std::set<std::string> names;
+    for (std::string word; words >> word;) {
+      if (word == "${TESSERA_ROOMS}") {
+        names.insert(all.begin(), all.end());
+      } else if (word != "\"\"") {
+        names.insert(word);
+      }
+    }
+    if ((*match)[1] == "ROOMS") {
+      all = names;
+    } else {
+      rules[(*match)[2]] = names;
+    }
+  }
+  return rules;
+}
+
+IncludeGraph read_rooms(const std::filesystem::path& source_tree, const Rules& rules) {
+  static const std::set<std::string> extensions{".h", ".cpp", ".glsl", ".comp", ".vert", ".frag", ".tesc", ".tese"};
+  IncludeGraph graph;
+  for (const auto& [room, used] : rules) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(source_tree / room)) {
+      if (!entry.is_regular_file() || !extensions.contains(entry.path().extension().string())) continue;
+      const std::string path = entry.path().lexically_relative(source_tree).generic_string();
+      graph[path] = includes_of(read_text(entry.path()));
+    }
+  }
+  return graph;
+}
+
+std::string room_of(const std::string& path, const Rules& rules) {
+  const std::string first = path.substr(0, path.find('/'));
+  return path.find('/') != std::string::npos && rules.contains(first) ? first : "";
+}
+
+std::vector<std::string> forbidden_uses(const IncludeGraph& graph, const Rules& rules) {
+  std::vector<std::string> found;
+  for (const auto& [file, includes] : graph) {
+    const std::string room = room_of(file, rules);
+    for (const std::string& include : includes) {
+      const std::string used = room_of(include, rules);
+      const bool allowed = used.empty() || used == room || rules.at(room).contains(used);
+      if (!allowed || include.find("..") != std::string::npos) found.push_back(file + " includes " + include);
+    }
+  }
+  return found;
+}
+
+std::set<std::string> reachable(const IncludeGraph& graph, const std::vector<std::string>& prefixes) {
+  std::vector<std::string> open;
+  for (const auto& [file, includes] : graph) {
+    for (const std::string& prefix : prefixes) {
+      if (file.starts_with(prefix)) open.push_back(file);
+    }
+  }
+  std::set<std::string> seen;
+  while (!open.empty()) {
+    const auto node = graph.find(open.back());
+    open.pop_back();
+    if (node == graph.end()) continue;
+    for (const std::string& include : node->second) {
+      if (seen.insert(include).second) open.push_back(include);
+    }
+  }
+  return seen;
+}
+
+}  // namespace tessera::architecture

@@ -1,0 +1,158 @@
+// Packets from an enemy, a broken disk, or a truncated stream.
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <memory>
+#include <random>
+
+#include "geometry-compression/bit_io.h"
+#include "geometry-compression/meta_codec.h"
+#include "synthetic.h"
+
+namespace tessera::geometry_compression {
+namespace {
+
+std::string decode_exactly(std::span<const uint8_t> bytes) {
+  const std::unique_ptr<uint8_t[]> copy(new uint8_t[bytes.size()]);  // the address sanitizer guards its end
+  std::copy(bytes.begin(), bytes.end(), copy.get());
+  MetaFrame out;
+  return decode({copy.get(), bytes.size()}, out);
+}
+
+TEST(MetaHostile, EveryPrefixIsAnError) {
+  std::mt19937 random(2);
+  std::vector<std::vector<uint8_t>> packets = {encode({}), encode(torus_frame(random, 8))};
+  for (int i = 0; i < 30; ++i) packets.push_back(encode(random_frame(random, 8)));
+  for (const auto& packet : packets)
+    for (size_t size = 0; size < packet.size(); ++size)
+      ASSERT_NE(decode_exactly(std::span(packet).first(size)), "") << size << " of " << packet.size();
+}
+
+TEST(MetaHostile, DataAfterTheEndIsAnError) {
+  std::mt19937 random(3);
+  auto packet = encode(random_frame(random, 8));
+  packet.push_back(0);
+  EXPECT_NE(decode_exactly(packet), "");
+}
+
+TEST(MetaHostile, FlippedBitsNeverCrash) {
+  std::mt19937 random(4);
+  int errors = 0;
+  for (int round = 0; round < 3000; ++round) {
+    auto packet = encode(random_frame(random, 10));
+    for (uint32_t flips = 1 + random() % 4; flips > 0; --flips)
+      packet[random() % packet.size()] ^= static_cast<uint8_t>(1u << random() % 8);
+    errors += !decode_exactly(packet).empty();
+  }
+  EXPECT_GT(errors, 500);  // most flips give another valid value
+}
+
+TEST(MetaHostile, NoiseBehindAValidHeaderNeverCrashes) {
+  std::mt19937 random(5);
+  for (int round = 0; round < 3000; ++round) {
+    auto packet = encode({});
+    packet.resize(19 + random() % 200);
+    for (size_t i = 17; i < packet.size(); ++i) packet[i] = static_cast<uint8_t>(random());
+    decode_exactly(packet);
+  }
+}
+
+// The header up to the counts, then `counts`.
+std::vector<uint8_t> header_that_claims(std::array<uint32_t, 6> counts) {
+  BitWriter out;
+  out.put(0x54534D46, 32);
+  out.put(kMetaVersion, 8);
+  out.put(0, 64);
+  out.put(16 << 16 | 16, 32);
+  out.put(0, 1);
+  for (uint32_t n : counts) out.put_unsigned(n, 6);
+  out.put_unsigned(0, 12);
+  return std::move(out).take();
+}
+
+TEST(MetaHostile, ClaimsBeyondTheLimitsAreRefusedBeforeAnythingIsRead) {
+  for (int section = 0; section < 6; ++section) {
+    std::array<uint32_t, 6> counts{};
+    counts[section] = UINT32_MAX;
+    const std::string error = decode_exactly(header_that_claims(counts));
+    EXPECT_NE(error.find("limit"), std::string::npos) << error;
+  }
+}
+
+TEST(MetaHostile, ClaimsWithinTheLimitsAllocateOnlyWhatTheBytesHold) {
+  for (int section = 0; section < 6; ++section) {
+    std::array<uint32_t, 6> counts{};
+    counts[section] = 1u << 20;
+    const auto packet = header_that_claims(counts);
+    MetaFrame out;
+    EXPECT_NE(decode(packet, out), "");
+    // A run header of 5 bits brings at most 64 items.
+    const size_t most = 64 * 8 * packet.size() / 5;
+    EXPECT_LE(out.meshes.capacity(), most);
+    EXPECT_LE(out.vertices.capacity(), most);
+    EXPECT_LE(out.objects.capacity(), most);
+    EXPECT_LE(out.moved.capacity(), most);
+    EXPECT_LE(out.patches.capacity(), most);
+    EXPECT_LE(out.placements.capacity(), most);
+  }
+}
+
+TEST(MetaHostile, LimitsAreTheReceivers) {
+  std::mt19937 random(8);
+  const auto packet = encode(torus_frame(random, 8));
+  MetaFrame out;
+  EXPECT_EQ(decode(packet, out), "");
+  EXPECT_NE(decode(packet, out, {.max_vertices = 63}), "");
+  EXPECT_NE(decode(packet, out, {.max_objects = 0}), "");
+  EXPECT_NE(decode(packet, out, {.max_patches = 63}), "");
+}
+
+TEST(MetaHostile, OtherVersionsAndFormatsAreNamed) {
+  auto packet = encode({});
+  packet[4] = kMetaVersion + 1;
+  EXPECT_NE(decode_exactly(packet).find("version 2"), std::string::npos);
+  packet = encode({});
+  packet[0] = 'X';
+  EXPECT_NE(decode_exactly(packet).find("TSMF"), std::string::npos);
+}
+
+TEST(MetaHostile, ValuesOutsideTheirRangeAreErrors) {
+  const float inf = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto refuses = [](const MetaFrame& frame) { return !decode_exactly(encode(frame)).empty(); };
+  for (float bad : {inf, -inf, nan}) {
+    MetaFrame f;
+    f.objects.resize(1);
+    f.objects[0].transform.linear[4] = bad;
+    EXPECT_TRUE(refuses(f));
+    f = {};
+    f.moved.resize(1);
+    f.moved[0].transform.translation[2] = bad;
+    EXPECT_TRUE(refuses(f));
+    f = {};
+    f.meshes.resize(1);
+    f.meshes[0].offset[0] = bad;
+    EXPECT_TRUE(refuses(f));
+  }
+  MetaFrame f;
+  for (double step : {0.0, -1.0}) {
+    f = {};
+    f.meshes = {{{}, step}};
+    EXPECT_TRUE(refuses(f));
+  }
+  for (int32_t q : {1 << 30, -(1 << 30)}) {
+    f = {};
+    f.vertices = {{0, {0, q, 0}}};
+    EXPECT_TRUE(refuses(f));
+  }
+  f = {};
+  f.placements = {{0, PlacementKind::block, 8192, 0, 1, 1, false, 0}};
+  EXPECT_TRUE(refuses(f));
+  f.placements = {{0, PlacementKind::block, 0, 0, 9, 1, false, 0}};
+  EXPECT_TRUE(refuses(f));
+  f.placements = {{0, PlacementKind::block, 0, 0, 1, 0, false, 0}};
+  EXPECT_TRUE(refuses(f));
+}
+
+}  // namespace
+}  // namespace tessera::geometry_compression

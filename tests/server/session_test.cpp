@@ -1,0 +1,177 @@
+#include "server/session.h"
+
+#include <gtest/gtest.h>
+
+#include "codec/video_decoder.h"
+#include "scene/procedural.h"
+
+namespace tessera::server {
+namespace {
+
+// A quad in front of the origin, facing it.
+std::shared_ptr<scene::Scene> make_quad() {
+  auto s = std::make_shared<scene::Scene>();
+  scene::Geometry g;
+  for (const vec3 p : {vec3{-1, -1, -3}, vec3{1, -1, -3}, vec3{-1, 1, -3}, vec3{1, 1, -3}}) {
+    scene::Vertex v{};
+    v.position = p;
+    v.normal = {0, 0, 1};
+    v.tangent = {1, 0, 0, 1};
+    v.color = 0xffffffffu;
+    g.vertices.push_back(v);
+    g.bounds.add(p);
+  }
+  g.indices = {0, 1, 2, 3, 2, 1};
+  g.patches = {{0, 2}};
+  g.meshlets = {{0, 2, 0, 1, {0, 0, -3}, 1.5f}};
+  s->geometries.push_back(g);
+  s->materials.emplace_back();
+  s->nodes.emplace_back();
+  s->instances = {{0, 0, 0}};
+  return s;
+}
+
+SessionSettings small_settings() {
+  SessionSettings s;
+  s.client_view.width = 320;
+  s.client_view.height = 180;
+  s.client_view.fov = Fov::symmetric(1.0f, 16.0f / 9.0f);
+  s.layout.width = 512;
+  s.layout.height = 256;
+  s.layout.superblock_log = 6;
+  s.layout.levels.max_log = 6;
+  s.rate.bitrate_bps = 8e6;
+  return s;
+}
+
+std::shared_ptr<gpu::Device> device() {
+  static std::shared_ptr<gpu::Device> shared = [] {
+    auto created = gpu::Device::create({.select = "cpu", .validation = true});
+    EXPECT_TRUE(created.ok()) << created.status();
+    return *created;
+  }();
+  return shared;
+}
+
+template <class T>
+T must(StatusOr<T> value) {
+  EXPECT_TRUE(value.ok()) << value.status();
+  return *std::move(value);
+}
+
+struct Counters {
+  uint64_t dispatches = device()->dispatches_recorded(), draws = device()->draws_recorded();
+};
+
+FrameInput input(FrameNumber number, std::span<const TimedPose> poses) {
+  return {.number = number, .poses = poses, .round_trip_ns = 100 * kNsPerMs};
+}
+
+class SessionTest : public testing::Test {
+ protected:
+  void TearDown() override { EXPECT_EQ(device()->validation_messages(), 0u); }
+};
+
+TEST_F(SessionTest, FramesDecodeOnTheOtherSide) {
+  auto quad = make_quad();
+  quad->index_instances();
+  auto session = must(Session::create(must(SharedScene::create(device(), quad)), small_settings()));
+  auto decoder = must(codec::VideoDecoder::create());
+  const std::vector<TimedPose> poses = {{0, Pose{}}};
+  for (FrameNumber n = 0; n < 4; ++n) {
+    const Frame frame = must(session->render(input(n, poses)));
+    EXPECT_EQ(frame.atlas.key_frame, n == 0);
+    const auto decoded = must(decoder->decode(frame.atlas.bytes));
+    EXPECT_EQ(decoded.frame, n);
+    EXPECT_EQ(decoded.picture.width, 512u);
+    geometry_compression::MetaFrame meta;
+    EXPECT_EQ(geometry_compression::decode(frame.meta, meta), "");
+    EXPECT_EQ(meta.frame, n);
+    EXPECT_EQ(meta.full_state, n == 0);
+    EXPECT_EQ(meta.patches.size(), n == 0 ? 1u : 0u);
+    EXPECT_EQ(meta.placements.size(), n == 0 ? 1u : 0u) << "a still view moves nothing";
+  }
+  EXPECT_EQ(session->placements().size(), 1u);
+}
+
+TEST_F(SessionTest, KeyFrameOnRequest) {
+  auto quad = make_quad();
+  quad->index_instances();
+  auto session = must(Session::create(must(SharedScene::create(device(), quad)), small_settings()));
+  const std::vector<TimedPose> poses = {{0, Pose{}}};
+  must(session->render(input(0, poses)));
+  FrameInput second = input(1, poses);
+  second.key_frame = true;
+  EXPECT_TRUE(must(session->render(second)).atlas.key_frame);
+}
+
+TEST_F(SessionTest, EqualInputsGiveEqualBytes) {
+  auto gallery = scene::make_gallery(0);
+  auto shared = must(SharedScene::create(device(), gallery));
+  const CameraPath path = scene::gallery_path();
+  auto run = [&] {
+    auto session = must(Session::create(shared, small_settings()));
+    std::vector<std::vector<uint8_t>> bytes;
+    std::vector<TimedPose> poses;
+    for (FrameNumber n = 0; n < 4; ++n) {
+      poses.push_back({from_ms(33 * n), path.at(from_ms(33 * n))});
+      const Frame frame = must(session->render(input(n, poses)));
+      bytes.push_back(frame.meta);
+      bytes.push_back(frame.atlas.bytes);
+    }
+    return bytes;
+  };
+  EXPECT_EQ(run(), run());
+}
+
+TEST_F(SessionTest, RefusesAFrameWithoutPoses) {
+  auto quad = make_quad();
+  quad->index_instances();
+  auto session = must(Session::create(must(SharedScene::create(device(), quad)), small_settings()));
+  EXPECT_EQ(session->render(input(0, {})).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+// What a scene does not need must record nothing and hold no memory (the frame plan's promise).
+struct Cost {
+  uint64_t dispatches, draws, bytes;
+  uint32_t shadow_maps;
+};
+
+Cost cost_of(std::shared_ptr<scene::Scene> s) {
+  s->index_instances();
+  const uint64_t bytes_before = device()->memory_in_use();
+  auto shared = must(SharedScene::create(device(), s));
+  auto session = must(Session::create(shared, small_settings()));
+  const uint64_t bytes = device()->memory_in_use() - bytes_before;
+  const Counters before;
+  const std::vector<TimedPose> poses = {{0, Pose{}}};
+  must(session->render(input(0, poses)));
+  const Counters after;
+  return {after.dispatches - before.dispatches, after.draws - before.draws, bytes, shared->lighting().shadow_maps()};
+}
+
+TEST_F(SessionTest, OmittedPassesCostNothing) {
+  const Cost plain = cost_of(make_quad());
+  EXPECT_EQ(plain.shadow_maps, 0u);
+
+  auto sunny = make_quad();
+  sunny->lights.push_back({.type = scene::LightType::directional, .intensity = 3, .node = 0});
+  const Cost sun = cost_of(sunny);
+  EXPECT_EQ(sun.shadow_maps, 1u);
+  EXPECT_GT(sun.draws, plain.draws);
+  EXPECT_GT(sun.bytes, plain.bytes);
+
+  auto leaves = make_quad();
+  leaves->materials[0].alpha_mode = scene::AlphaMode::mask;
+  const Cost masked = cost_of(leaves);
+  EXPECT_EQ(masked.shadow_maps, 0u);
+
+  auto point_lit = make_quad();
+  point_lit->lights.push_back({.type = scene::LightType::point, .intensity = 3, .node = 0});
+  const Cost point = cost_of(point_lit);
+  EXPECT_EQ(point.draws, plain.draws) << "a light without shadow adds no pass";
+  EXPECT_EQ(point.dispatches, plain.dispatches);
+}
+
+}  // namespace
+}  // namespace tessera::server

@@ -1,0 +1,263 @@
+// The gather: known answers by position, both paths alike, and the truth's colours.
+#include <gmock/gmock.h>
+
+#include "scene_builder.h"
+#include "shader_functions.h"
+#include "test_world.h"
+
+namespace tessera::shading::test {
+namespace {
+
+using atlas::Placement;
+using atlas::PlacementKind;
+
+Placement block(scene::PatchId patch, uint32_t x, uint32_t y, uint8_t log_w, uint8_t log_h, bool transposed = false,
+                bool masked = false) {
+  return {patch, PlacementKind::block, {log_w, log_h}, static_cast<uint16_t>(x), static_cast<uint16_t>(y), transposed,
+          masked};
+}
+
+float linear(uint8_t byte) { return srgb_decode(static_cast<float>(byte) / 255); }
+
+// Vertex colours carry the block coordinates; unlit shows them as they are.
+scene::Material coordinates() { return {.unlit = true}; }
+
+scene::Material wavy(SceneBuilder& b, bool half_cut) {
+  scene::Material m{.metallic = 0.3f, .roughness = 0.4f, .double_sided = true};
+  m.base_color_texture.texture = b.texture(wavy_texture(64, half_cut));
+  if (half_cut) m.alpha_mode = scene::AlphaMode::mask;
+  return m;
+}
+
+class BothPaths : public testing::TestWithParam<GatherPath> {
+ protected:
+  GatherSettings settings() const { return {.width = 128, .height = 64, .path = GetParam()}; }
+};
+
+TEST_P(BothPaths, CornersLieAtTexelCentres) {
+  for (uint32_t triangles = 1; triangles <= 3; ++triangles) {
+    SceneBuilder b;
+    b.instance(b.patch(triangles), b.material(coordinates()));
+    const World world = make_world(b.build());
+    const std::vector<Placement> placements{block(0, 0, 0, 4, 4), block(0, 16, 0, 5, 3), block(0, 48, 0, 3, 2),
+                                            block(0, 64, 0, 1, 1), block(0, 0, 32, 4, 3, true)};
+    const GatherResult r = gather(world, {0.5, 0.5, 2}, placements, settings());
+    for (const Placement& p : placements)
+      for (uint32_t t = 0; t < triangles; ++t)
+        for (uint32_t c = 0; c < 3; ++c) {
+          const vec2 corner = scene::patch_corner(triangles, t, c);
+          const vec2 along = p.transposed ? vec2(corner.y, corner.x) : corner;
+          const uint32_t x = p.x + static_cast<uint32_t>(std::lround(along.x * static_cast<float>(p.width() - 1)));
+          const uint32_t y = p.y + static_cast<uint32_t>(std::lround(along.y * static_cast<float>(p.height() - 1)));
+          if (triangles == 3 && p.width() == 2) continue;  // the tip shares a corner's texel
+          EXPECT_NEAR(linear(r.atlas.at(x, y)[0]), corner.x, 0.01f) << triangles << " at " << x << "," << y;
+          EXPECT_NEAR(linear(r.atlas.at(x, y)[1]), corner.y, 0.01f) << triangles << " at " << x << "," << y;
+          EXPECT_EQ(r.atlas.at(x, y)[3], 255);
+        }
+  }
+}
+
+TEST_P(BothPaths, EveryTexelOfATwoTrianglePatchIsLinear) {
+  SceneBuilder b;
+  b.instance(b.patch(2), b.material(coordinates()));
+  const World world = make_world(b.build());
+  for (const bool transposed : {false, true}) {
+    const Placement p = block(0, 8, 16, 5, 4, transposed);
+    const GatherResult r = gather(world, {0.5, 0.5, 2}, {&p, 1}, settings());
+    for (uint32_t j = 0; j < 16; ++j)
+      for (uint32_t i = 0; i < 32; ++i) {
+        const float u = static_cast<float>(i) / 31, v = static_cast<float>(j) / 15;
+        const uint8_t* texel = r.atlas.at(8 + i, 16 + j);
+        EXPECT_NEAR(linear(texel[0]), transposed ? v : u, 0.01f);
+        EXPECT_NEAR(linear(texel[1]), transposed ? u : v, 0.01f);
+      }
+  }
+}
+
+TEST_P(BothPaths, ALoneTriangleRepeatsItsEdge) {
+  SceneBuilder b;
+  b.instance(b.patch(1), b.material(coordinates()));
+  const Placement p = block(0, 0, 0, 4, 4);
+  const GatherResult r = gather(make_world(b.build()), {0.5, 0.5, 2}, {&p, 1}, settings());
+  EXPECT_NEAR(linear(r.atlas.at(15, 15)[0]), 0.5f, 0.01f);
+  EXPECT_NEAR(linear(r.atlas.at(15, 15)[1]), 0.5f, 0.01f);
+  for (uint32_t j = 0; j < 16; ++j)
+    for (uint32_t i = 16 - j; i < 16; ++i)
+      EXPECT_NEAR(linear(r.atlas.at(i, j)[0]) + linear(r.atlas.at(i, j)[1]), 1, 0.02f);
+}
+
+TEST_P(BothPaths, MaskedBlocksCarryCoverageInTheirSecondHalf) {
+  SceneBuilder b;
+  b.instance(b.patch(2), b.material(wavy(b, true)));
+  const World world = make_world(b.build());
+  const std::vector<Placement> placements{block(0, 0, 0, 5, 4, false, true), block(0, 32, 0, 4, 4, false, true)};
+  const GatherResult r = gather(world, {0.5, 0.5, 2}, placements, settings());
+  for (uint32_t j = 0; j < 16; ++j)
+    for (uint32_t i = 0; i < 16; ++i) {
+      const uint8_t* grey = r.atlas.at(16 + i, j);
+      EXPECT_EQ(grey[0], grey[1]);
+      EXPECT_EQ(grey[0], grey[2]);
+      if (i < 7) EXPECT_LT(grey[0], 20);
+      if (i > 8) EXPECT_GT(grey[0], 235);
+    }
+  for (uint32_t j = 0; j < 8; ++j)
+    for (uint32_t i = 0; i < 16; ++i) {
+      if (i < 7) EXPECT_LT(r.atlas.at(32 + i, 8 + j)[0], 20);
+      if (i > 8) EXPECT_GT(r.atlas.at(32 + i, 8 + j)[0], 235);
+    }
+}
+
+TEST_P(BothPaths, UnusedTexelsKeepMidGrey) {
+  SceneBuilder b;
+  b.instance(b.patch(2), b.material(coordinates()));
+  const Placement p = block(0, 4, 4, 2, 2);
+  const GatherResult r = gather(make_world(b.build()), {0.5, 0.5, 2}, {&p, 1}, settings());
+  for (uint32_t y = 0; y < 64; ++y)
+    for (uint32_t x = 0; x < 128; ++x) {
+      const bool used = x >= 4 && x < 8 && y >= 4 && y < 8;
+      EXPECT_EQ(r.atlas.at(x, y)[3], used ? 255 : 0);
+      if (!used) EXPECT_NEAR(r.atlas.at(x, y)[1], 128, 1);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Gather, BothPaths, testing::Values(GatherPath::compute, GatherPath::raster),
+                         [](const auto& p) { return p.param == GatherPath::compute ? "compute" : "raster"; });
+
+// Three materials, all patch kinds, lights, shadows.
+std::shared_ptr<scene::Scene> mixed_scene() {
+  SceneBuilder b;
+  const uint32_t masked = b.material(wavy(b, true)), solid = b.material(wavy(b, false));
+  scene::Material plain{.base_color = vec4(0.4f, 0.7f, 0.2f, 1), .metallic = 0, .roughness = 0.5f};
+  const uint32_t green = b.material(plain);
+  b.instance(b.rectangle({-2, -0.5f, 2}, {4, 0, 0}, {0, 0, -4}, 4), solid);
+  for (uint32_t t = 1; t <= 3; ++t)
+    for (const uint32_t m : {masked, green, solid}) {
+      scene::Node node;
+      node.translation = {0.7 * t - 1.5, 0, 0.5 * m};
+      b.instance(b.patch(t), m, node);
+    }
+  b.light({.type = scene::LightType::directional, .intensity = 3}, {}, {0.3, -1, -0.5});
+  b.light({.type = scene::LightType::point, .color = vec3(1, 0.5f, 0.2f), .intensity = 4, .range = 5}, {0, 1, 2}, {0, 0, -1});
+  return b.build();
+}
+
+std::vector<Placement> mixed_placements(const scene::Scene& scene) {
+  std::vector<Placement> placements;
+  uint32_t x = 0, y = 0;
+  for (scene::PatchId p = 0; p < scene.patch_count; ++p) {
+    const bool masked = scene.materials[scene.instances[scene.instance_of(p)].material].alpha_mode ==
+                        scene::AlphaMode::mask;
+    if (p % 5 == 4) {
+      placements.push_back({.patch = p, .kind = PlacementKind::color, .masked = masked});
+      continue;
+    }
+    const auto log_h = static_cast<uint8_t>(1 + p % 5), log_w = static_cast<uint8_t>(log_h + p % 2);
+    placements.push_back(block(p, x, y, log_w, log_h, p % 3 == 0, masked));
+    x += 64;
+    if (x == 512) x = 0, y += 32;
+  }
+  return placements;
+}
+
+TEST(Gather, ComputeAndRasterAgree) {
+  const auto scene = mixed_scene();
+  const World world = make_world(scene);
+  const std::vector<Placement> placements = mixed_placements(*scene);
+  const dvec3 eye(0.5, 1.5, 4);
+  GatherSettings settings{.width = 512, .height = 256, .path = GatherPath::compute};
+  const GatherResult compute = gather(world, eye, placements, settings);
+  settings.path = GatherPath::raster;
+  const GatherResult raster = gather(world, eye, placements, settings);
+  settings.path = GatherPath::automatic;
+  const GatherResult both = gather(world, eye, placements, settings);
+  EXPECT_EQ(compute.stats.samples, raster.stats.samples);
+  EXPECT_EQ(compute.stats.raster_blocks, 0u);
+  EXPECT_EQ(raster.stats.compute_blocks, 0u);
+  EXPECT_GT(both.stats.raster_blocks, 0u);
+  EXPECT_GT(both.stats.compute_blocks, 0u);
+  EXPECT_EQ(compute.colors, raster.colors);
+  EXPECT_EQ(compute.colors.size(), compute.stats.color_samples);
+  size_t used = 0, differing = 0;
+  for (size_t i = 0; i < compute.atlas.rgba.size(); ++i) {
+    used += compute.atlas.rgba[i | 3] != 0;
+    differing += std::abs(compute.atlas.rgba[i] - raster.atlas.rgba[i]) > 1;
+    differing += std::abs(compute.atlas.rgba[i] - both.atlas.rgba[i]) > 1;
+  }
+  EXPECT_GT(used, 10000u);
+  EXPECT_LE(differing, used / 1000);
+}
+
+TEST(Gather, MatchesTheReferencePicture) {
+  SceneBuilder b;
+  scene::Material m{.metallic = 0, .roughness = 0.6f};
+  m.base_color_texture.texture = b.texture(wavy_texture(64, false));
+  b.instance(b.rectangle({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), b.material(m));
+  b.light({.type = scene::LightType::point, .intensity = 6}, {0.3, 0.4, 1}, {0, 0, -1});
+  const World world = make_world(b.build());
+  const dvec3 eye(0, 0, 2);
+  const Placement p = block(0, 0, 0, 6, 6);
+  const GatherResult r = gather(world, eye, {&p, 1}, {.width = 64, .height = 64});
+  // A view in which texel centres are pixel centres: 64 texels span 63/64 of the picture's 2 m at 2 m distance.
+  const float t = 0.5f * 64 / 63;
+  View view = look(eye, {}, 64);
+  view.fov = {-t, t, -t, t};
+  const ReferenceImage truth = render(world, view, {.samples = 1});
+  double error = 0;
+  for (uint32_t y = 0; y < 64; ++y)
+    for (uint32_t x = 0; x < 64; ++x)
+      for (int c = 0; c < 3; ++c) error += std::abs(r.atlas.at(x, 63 - y)[c] - truth.color.at(x, y)[c]);
+  EXPECT_LT(error / (3 * 64 * 64), 0.7);
+}
+
+TEST(Gather, SingleColorsComeInTheOrderOfPlacements) {
+  SceneBuilder b;
+  const vec4 colors[] = {{1, 0, 0, 1}, {0, 1, 0, 1}, {0, 0, 1, 1}};
+  const uint32_t geometry = b.patch(2);
+  for (auto& v : b.scene().geometries[0].vertices) v.color = ~0u;
+  for (const vec4& color : colors) b.instance(geometry, b.material({.base_color = color, .unlit = true}));
+  const World world = make_world(b.build());
+  const Placement placements[] = {{.patch = 2}, block(1, 0, 0, 2, 2), {.patch = 0}, {.patch = 1}};
+  const GatherResult r = gather(world, {0, 0, 2}, placements, {.width = 16, .height = 16});
+  EXPECT_THAT(r.colors, testing::ElementsAre(0xff0000u, 0x0000ffu, 0x00ff00u));
+  EXPECT_EQ(r.stats.color_samples, 3u);
+  EXPECT_EQ(r.stats.samples, 3u + 16u);
+}
+
+TEST(Gather, AnEmptyLayoutDispatchesNothing) {
+  SceneBuilder b;
+  b.instance(b.patch(2), b.material({}));
+  const World world = make_world(b.build());
+  const uint64_t draws = device().draws_recorded(), dispatches = device().dispatches_recorded();
+  EXPECT_EQ(gather(world, {}, {}, {.width = 16, .height = 16}).stats.samples, 0u);
+  EXPECT_EQ(device().draws_recorded(), draws);
+  EXPECT_EQ(device().dispatches_recorded(), dispatches);
+}
+
+TEST(Gather, RefusesPlacementsThatLeaveTheAtlasOrTheScene) {
+  SceneBuilder b;
+  b.instance(b.patch(2), b.material({}));
+  const World world = make_world(b.build());
+  const auto gather = Gather::create(device(), *world.gpu_scene, *world.lighting, {.width = 16, .height = 16});
+  ASSERT_TRUE(gather.ok());
+  for (const Placement& p : {block(1, 0, 0, 2, 2), block(0, 14, 0, 2, 2), block(0, 0, 14, 2, 2), block(0, 0, 0, 40, 2),
+                             Placement{.patch = scene::kNone}}) {
+    gpu::Commands commands = device().begin();
+    EXPECT_EQ((*gather)->record(commands, *world.instant, {}, {&p, 1}).code(), absl::StatusCode::kInvalidArgument);
+  }
+}
+
+TEST(Gather, BothSidesOfADoubleSidedPatchAreLitFromTheEye) {
+  SceneBuilder b;
+  b.instance(b.patch(2), b.material({.metallic = 0, .double_sided = true}));
+  b.light({.type = scene::LightType::point, .intensity = 20}, {0.5, 0.5, 2}, {0, 0, -1});
+  LightingSettings dark;
+  dark.ambient_sky = dark.ambient_ground = vec3(0);
+  const World world = make_world(b.build(), dark);
+  const Placement p = block(0, 0, 0, 2, 2);
+  const GatherSettings settings{.width = 16, .height = 16};
+  EXPECT_GT(gather(world, {0.5, 0.5, 3}, {&p, 1}, settings).atlas.at(3, 3)[0], 100);
+  EXPECT_LT(gather(world, {0.5, 0.5, -3}, {&p, 1}, settings).atlas.at(3, 3)[0], 5);
+}
+
+}  // namespace
+}  // namespace tessera::shading::test
