@@ -12,10 +12,14 @@ constexpr float kMaxSidePx = 1e6f;  // beyond any screen; keeps the products bel
 constexpr float kMaxElongation = 65536.0f;
 
 // NaN and negative values count as 0.
-float sane(float value, float max) { return value > 0 ? std::min(value, max) : 0.0f; }
+float sane(float value, float max) {
+  return value > 0 ? std::min(value, max) : 0.0f;
+}
 
 // Valid in (-64, 64).
-int round_to_int(float value) { return static_cast<int>(value + 64.5f) - 64; }
+int round_to_int(float value) {
+  return static_cast<int>(value + 64.5f) - 64;
+}
 
 // The nearest integer of the same parity as `like`.
 int round_to_parity(float value, int like) {
@@ -28,11 +32,15 @@ struct Shape {
   int area = 0, aspect = 0;
 };
 
-int min_area(bool masked, int max_log) { return masked ? std::min(2 * kMinLog, 2 * max_log - 1) : 2 * kMinLog; }
-int max_area(bool masked, int max_log) { return masked ? 2 * max_log - 1 : 2 * max_log; }
+int min_area(bool masked, int max_log) {
+  return masked ? std::min(2 * kMinLog, 2 * max_log - 1) : 2 * kMinLog;
+}
+int max_area(bool masked, int max_log) {
+  return masked ? 2 * max_log - 1 : 2 * max_log;
+}
 
-// The largest aspect that a block of this area can have between the shortest and the longest side; has the area's
-// parity.
+// The largest aspect that a block of this area can have between the shortest and the longest side; has the
+// area's parity.
 int max_aspect(int area, bool masked, int max_log) {
   if (masked && area == max_area(masked, max_log)) return 1;  // half of the largest square
   const int max_width = masked ? max_log - 1 : max_log;
@@ -59,7 +67,8 @@ double block_texels(float area_log, float color_log, float max_area_log) {
   return static_cast<double>(uint64_t{1} << static_cast<int>(clamped + 0.5f));
 }
 
-// Ideal areas, counted in bins that are linear within an octave: a float's exponent and leading mantissa bits.
+// Ideal areas, counted in bins that are linear within an octave: a float's exponent and leading mantissa
+// bits.
 class AreaHistogram {
  public:
   explicit AreaHistogram(std::span<const float> areas) {
@@ -114,9 +123,9 @@ BlockNeed block_need(const scene::Footprint& footprint, const PatchTraits& trait
   // Edges that vanish together have no direction.
   if (u > 0 || v > 0) need.elongation = std::min(std::max(u, v) / std::min(u, v), kMaxElongation);
   const float length = std::sqrt(area * need.elongation);
-  // A block is at least 2 texels high. A sliver is granted them, or its length would pay for its height; up to four
-  // times its area, since below half a pixel of height little of its detail reaches the screen. No grant to patches
-  // that are small both ways.
+  // A block is at least 2 texels high. A sliver is granted them, or its length would pay for its height; up
+  // to four times its area, since below half a pixel of height little of its detail reaches the screen. No
+  // grant to patches that are small both ways.
   const float granted = std::min(std::min(4 * area, 2 * length), 0.5f * length * area);
   need.area = (traits.masked ? 2.0f : 1.0f) * std::max(area, granted);
   return need;
@@ -143,10 +152,12 @@ LevelWish select_level(const BlockNeed& need, bool masked, float bias, const Lev
   const bool anchored = previous && !previous->single_color;
   const Shape before = anchored ? shape_of(*previous, masked) : Shape{};
   const int max_log = settings.max_log;
-  const float area_log = std::clamp(masked ? block_log - 1 : block_log, static_cast<float>(min_area(masked, max_log)),
-                                    static_cast<float>(max_area(masked, max_log)));
+  const float area_log =
+      std::clamp(masked ? block_log - 1 : block_log, static_cast<float>(min_area(masked, max_log)),
+                 static_cast<float>(max_area(masked, max_log)));
   Shape shape{.area = round_to_int(area_log)};
-  if (anchored && std::abs(area_log - static_cast<float>(before.area)) <= 0.5f + margin) shape.area = before.area;
+  if (anchored && std::abs(area_log - static_cast<float>(before.area)) <= 0.5f + margin)
+    shape.area = before.area;
 
   // Sides that would leave the range keep the area, so that its sum can be foretold.
   const float limit = static_cast<float>(max_aspect(shape.area, masked, max_log));
@@ -161,8 +172,8 @@ LevelWish select_level(const BlockNeed& need, bool masked, float bias, const Lev
   return wish_of(shape, masked, max_log);
 }
 
-// The use is a falling step function of the bias. Its inverse is searched on a fixed grid, so that the result is
-// monotonic in the target.
+// The use is a falling step function of the bias. Its inverse is searched on a fixed grid, so that the result
+// is monotonic in the target.
 float select_bias(std::span<const float> ideal_areas, double target_texels, const LevelSettings& settings) {
   constexpr float kStep = 1.0f / 64;
   const AreaHistogram histogram(ideal_areas);

@@ -1,5 +1,5 @@
-// Block sizes from footprints (thesis 3.5, eqs. 3.2, 3.3): the bias that makes the wish list fit, the adaptive target,
-// and hysteresis against flicker between two levels (thesis 8.3).
+// Block sizes from footprints (thesis 3.5, eqs. 3.2, 3.3): the bias that makes the wish list fit, the
+// adaptive target, and hysteresis against flicker between two levels (thesis 8.3).
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,12 @@
 namespace tessera::atlas {
 
 struct LevelSettings {
-  uint8_t max_log = 8;           // log2 of the superblock's side
-  float hysteresis = 0.25f;      // in levels of area: a patch changes only when its wish lies this far past the border
-  float min_bias = -2.0f;        // negative: the atlas has room for more than one texel a pixel (thesis 4.1)
+  uint8_t max_log = 8;  // log2 of the superblock's side
+  float hysteresis =
+      0.25f;  // in levels of area: a patch changes only when its wish lies this far past the border
+  float min_bias = -2.0f;  // negative: the atlas has room for more than one texel a pixel (thesis 4.1)
   float max_bias = 16.0f;
-  float color_area_px2 = 1.5f;   // biased area below which a patch becomes a single colour
+  float color_area_px2 = 1.5f;  // biased area below which a patch becomes a single colour
 };
 
 // The patch's traits that level selection needs.
@@ -33,7 +34,8 @@ struct LevelWish {
 
 // What a footprint asks for, before bias; both finite.
 struct BlockNeed {
-  float area = 0;        // texels: what the triangles need on screen, and the part of the block that they leave unused
+  float area =
+      0;  // texels: what the triangles need on screen, and the part of the block that they leave unused
   float elongation = 1;  // longer edge : shorter edge
   bool upright = false;  // v is the longer one
 };
@@ -42,19 +44,20 @@ BlockNeed block_need(const scene::Footprint& footprint, const PatchTraits& trait
 // Ideal block area of a footprint: the area of its block_need().
 float ideal_area(const scene::Footprint& footprint, const PatchTraits& traits);
 
-// The level for one patch (eq. 3.2). `previous` (or nullptr) anchors the hysteresis. Total: any finite or infinite
-// footprint gives a valid level; NaN counts as 0.
+// The level for one patch (eq. 3.2). `previous` (or nullptr) anchors the hysteresis. Total: any finite or
+// infinite footprint gives a valid level; NaN counts as 0.
 LevelWish select_level(const scene::Footprint& footprint, const PatchTraits& traits, float bias,
                        const LevelWish* previous, const LevelSettings& settings);
 LevelWish select_level(const BlockNeed& need, bool masked, float bias, const LevelWish* previous,
                        const LevelSettings& settings);
 
-// Global bias b for `target_texels`: the smallest that fits them. Eq. 3.3, b = log2((I - d) / (S - d)), is its value where
-// blocks are not clamped at either end, rounded, or replaced by a colour; here all of that counts. Monotonic: a smaller
-// target never gives a smaller bias. Clamped to [min_bias, max_bias].
+// Global bias b for `target_texels`: the smallest that fits them. Eq. 3.3, b = log2((I - d) / (S - d)), is
+// its value where blocks are not clamped at either end, rounded, or replaced by a colour; here all of that
+// counts. Monotonic: a smaller target never gives a smaller bias. Clamped to [min_bias, max_bias].
 float select_bias(std::span<const float> ideal_areas, double target_texels, const LevelSettings& settings);
 
-// The target S, calibrated by experience (thesis 3.5): a reset because memory ran out shrinks it, quiet time grows it.
+// The target S, calibrated by experience (thesis 3.5): a reset because memory ran out shrinks it, quiet time
+// grows it.
 class AdaptiveTarget {
  public:
   explicit AdaptiveTarget(double atlas_texels) : atlas_texels_(atlas_texels), share_(0.8) {}

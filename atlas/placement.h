@@ -23,15 +23,16 @@ enum class PlacementKind : uint8_t {
 // Within a block, corner c of the patch (scene::patch_corner) lies at the centre of texel
 //   x + round(c.u * (width - 1)), y + round(c.v * (height - 1))      (u and v swapped if transposed)
 // so that a bilinear fetch never leaves the block (half-texel inset, thesis fig. 3.4).
-// A masked patch's block is split in halves: left and right if it is wider than high, else upper and lower. Colour lies
-// in the first half, coverage as grey in the second; the map above then holds for the colour half.
+// A masked patch's block is split in halves: left and right if it is wider than high, else upper and lower.
+// Colour lies in the first half, coverage as grey in the second; the map above then holds for the colour
+// half.
 struct Placement {
   scene::PatchId patch = scene::kNone;
   PlacementKind kind = PlacementKind::color;
-  Level level;                 // kind block
-  uint16_t x = 0, y = 0;       // kind block: texels, even
-  bool transposed = false;     // the patch's u axis runs down
-  bool masked = false;         // has coverage
+  Level level;              // kind block
+  uint16_t x = 0, y = 0;    // kind block: texels, even
+  bool transposed = false;  // the patch's u axis runs down
+  bool masked = false;      // has coverage
   bool operator==(const Placement&) const = default;
 
   uint32_t width() const { return 1u << level.log_w; }
@@ -43,8 +44,8 @@ struct Placement {
 
 // What changed between two frames of a layout.
 struct LayoutDelta {
-  std::vector<Placement> changed;         // new, moved or of another level or kind; sorted by patch
-  std::vector<scene::PatchId> removed;    // sorted
+  std::vector<Placement> changed;       // new, moved or of another level or kind; sorted by patch
+  std::vector<scene::PatchId> removed;  // sorted
 };
 
 }  // namespace tessera::atlas

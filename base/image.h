@@ -1,6 +1,7 @@
 // Pixels on the CPU.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 

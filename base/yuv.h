@@ -1,6 +1,7 @@
 // 4:2:0 video frames on the CPU.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 

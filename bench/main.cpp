@@ -27,7 +27,7 @@ constexpr char kLoopbackFooter[] = R"(Examples:
   tessera-bench loopback --report report
   tessera-bench loopback --scene sponza.glb --path sponza_1.csv --seconds 3 --json sponza.json --report report
   tessera-bench loopback --delay-ms 100 --jitter-ms 10 --loss 0.01 --baselines none
-  tessera-bench loopback --codec none --pvs none --split off
+  tessera-bench loopback --pvs none --split off
   tessera-bench loopback --scene city:1000000 --path city --estimate-only)";
 
 int report_failure(const Status& status) {

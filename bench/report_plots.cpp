@@ -29,6 +29,8 @@ struct Point {
 struct Series {
   std::string name;
   std::vector<Point> points;
+  std::string method = name;  // decides the colour
+  int symbol = 7;             // gnuplot's pointtype
 };
 
 // Inside gnuplot's single quotes; its enhanced-text characters are off.
@@ -67,8 +69,9 @@ std::string series_script(const std::vector<Series>& series, const std::string& 
   for (size_t i = 0; i < series.size(); ++i) {
     if (series[i].points.empty()) continue;
     blocks += data_block(i, series[i].points);
-    absl::StrAppendFormat(&plot, "%s $d%d using 1:2 with %s lc rgb '%s' title %s",
-                          plot.empty() ? "plot" : ",", i, style, color_of(series[i].name, i),
+    const std::string symbol = style.starts_with("points") ? absl::StrCat(" pt ", series[i].symbol) : "";
+    absl::StrAppendFormat(&plot, "%s $d%d using 1:2 with %s%s lc rgb '%s' title %s",
+                          plot.empty() ? "plot" : ",", i, style, symbol, color_of(series[i].method, i),
                           quoted(series[i].name));
   }
   return plot.empty() ? "" : blocks + plot + "\n";
@@ -111,6 +114,9 @@ Series bitrate_series(const json& frames, const std::string& name, const char* f
   for (const auto& [bin, sum] : bytes) {
     series.points.push_back({kBitrateBinS * static_cast<double>(bin), sum * 8e-6 / kBitrateBinS});
   }
+  if (!series.points.empty()) {  // the last step has its width too
+    series.points.push_back({series.points.back().x + kBitrateBinS, series.points.back().y});
+  }
   return series;
 }
 
@@ -133,17 +139,18 @@ std::string scene_name(const json& run) {
   return std::filesystem::path(run.at("settings").value("scene", std::string("scene"))).stem();
 }
 
+// One series a row: colours tell methods apart, symbols runs.
 std::vector<Series> comparison_series(std::span<const json> runs,
                                       const std::function<Point(const json&)>& point) {
-  std::map<std::string, std::vector<Point>> by_method;
-  for (const json& run : runs) {
-    for (const json& row : run.at("rows")) {
+  static constexpr int kSymbols[] = {7, 5, 9, 11, 13};  // filled circle, square, triangles, diamond
+  std::vector<Series> series;
+  for (size_t i = 0; i < runs.size(); ++i) {
+    for (const json& row : runs[i].at("rows")) {
       const std::string method = row.value("method", std::string("?"));
-      by_method[runs.size() > 1 ? method + ", " + scene_name(run) : method].push_back(point(row));
+      const std::string name = runs.size() > 1 ? method + ", " + scene_name(runs[i]) : method;
+      series.push_back({name, {point(row)}, method, kSymbols[i % std::size(kSymbols)]});
     }
   }
-  std::vector<Series> series;
-  for (auto& [name, points] : by_method) series.push_back({name, std::move(points)});
   return series;
 }
 
@@ -231,9 +238,9 @@ std::vector<Plot> plot_comparison(std::span<const json> runs) {
   std::vector<Plot> plots;
   plots.push_back(draw("Error against compute time",
                        frame_script("server and client, ms a frame", "DSSIM") + from_zero,
-                       series_script(comparison_series(runs, time_point), "points pt 7 ps 1.2")));
+                       series_script(comparison_series(runs, time_point), "points ps 1.2")));
   plots.push_back(draw("Error against bit rate", frame_script("Mbit/s", "DSSIM") + from_zero,
-                       series_script(comparison_series(runs, rate_point), "points pt 7 ps 1.2")));
+                       series_script(comparison_series(runs, rate_point), "points ps 1.2")));
   return plots;
 }
 

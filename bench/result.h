@@ -30,7 +30,7 @@ struct Row {
   uint32_t session = 0;
   std::string note;  // what a reader must know, e.g. "depth is not counted"
   ImageError error;
-  std::optional<double> holes, coverage, overestimation;
+  std::optional<double> holes, coverage, coverage_without_prediction, overestimation;
   double mbps_total = 0, mbps_atlas = 0, mbps_meta = 0;
   uint64_t frames_displayed = 0;                    // scored or not
   uint64_t frames_stale = 0;                        // displayed again without a newer pair

@@ -25,7 +25,7 @@ void for_each_option(Settings& s, Visitor&& visit) {
   visit("Server", "server-ms", s.server_ms, "time charged to a server frame in virtual time");
   visit("Server", "atlas", s.atlas, "atlas size in texels (even; width a multiple of 8)");
   visit("Server", "layout", s.layout, "atlas layout");
-  visit("Server", "codec", s.codec, "atlas coding; none = uncoded, at no cost in bits");
+  visit("Server", "codec", s.codec, "atlas coding");
   visit("Server", "bitrate-mbps", s.bitrate_mbps, "atlas and meta together");
   visit("Server", "pvs", s.pvs, "prediction of the potentially visible set");
   visit("Server", "sessions", s.sessions, "clients at once");
@@ -46,7 +46,7 @@ void for_each_option(Settings& s, Visitor&& visit) {
   visit("Output", "estimate-only", s.estimate_only, "print how long the run would take, and stop");
 }
 
-const std::map<std::string, Codec> kCodecs{{"h264", Codec::h264}, {"none", Codec::none}};
+const std::map<std::string, Codec> kCodecs{{"h264", Codec::h264}};
 const std::map<std::string, Truth> kTruths{{"4x", Truth::supersampled}, {"1x", Truth::one}};
 const std::map<std::string, Prediction> kPredictions{{"linear", Prediction::linear},
                                                      {"none", Prediction::none}};
@@ -71,6 +71,13 @@ struct AddOption {
   void operator()(const char* group, const std::string& name, std::vector<std::string>& field,
                   const char* meaning) const {
     finish(app.add_option("--" + name, field, meaning)->delimiter(','), group, name);
+  }
+  // A switch that is off by default is a plain flag (--x or --x=on); one that is on takes its value (--x
+  // off).
+  void operator()(const char* group, const std::string& name, bool& field, const char* meaning) const {
+    CLI::Option* option =
+        field ? app.add_option("--" + name, field, meaning) : app.add_flag("--" + name, field, meaning);
+    finish(option, group, name);
   }
   void operator()(const char* group, const std::string& name, Codec& field, const char* meaning) const {
     add_choice(group, name, field, meaning, kCodecs);
@@ -162,6 +169,7 @@ void add_checks(CLI::App& app) {
   check("--jitter-ms", CLI::Range(0.0, 10000.0));
   check("--loss", CLI::Range(0.0, 0.5));
   check("--clock", CLI::IsMember({"virtual"}));
+  check("--seed", CLI::NonNegativeNumber);
   check("--score-every", CLI::Range(1, 1'000'000));
   check("--baselines", CLI::IsMember({"plain-video", "mesh-warp", "none"}));
 }

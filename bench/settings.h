@@ -24,7 +24,7 @@ struct Size {
 std::istream& operator>>(std::istream& in, Size& size);
 std::ostream& operator<<(std::ostream& out, const Size& size);
 
-enum class Codec { h264, none };         // none: the atlas reaches the client uncoded, at no cost in bits
+enum class Codec { h264 };
 enum class Truth { supersampled, one };  // 4x or 1x
 enum class Prediction { linear, none };
 

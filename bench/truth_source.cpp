@@ -23,8 +23,9 @@ StatusOr<std::unique_ptr<TruthSource>> TruthSource::create(std::shared_ptr<serve
   if (cache_dir == "none") {
     source->cache_ = std::make_unique<TruthCache>();
   } else {
-    TESSERA_ASSIGN_OR_RETURN(source->cache_,
-                             TruthCache::open(cache_dir.empty() ? default_truth_cache() : cache_dir));
+    const std::filesystem::path folder =
+        cache_dir.empty() ? default_truth_cache() : std::filesystem::path(cache_dir);
+    TESSERA_ASSIGN_OR_RETURN(source->cache_, TruthCache::open(folder));
   }
   source->identity_ = scene_identity(scene_spec);
   source->samples_ = samples;

@@ -24,7 +24,8 @@ struct ClientCore::Impl {
   Pairing pairing{pairs};
   geometry_compression::MetaFrame meta;  // kept for its memory
 
-  std::atomic<uint64_t> pairs_published{0}, pairs_skipped{0}, atlas_frames{0}, meta_frames{0}, decode_errors{0};
+  std::atomic<uint64_t> pairs_published{0}, pairs_skipped{0}, atlas_frames{0}, meta_frames{0},
+      decode_errors{0};
   std::atomic<FrameNumber> newest_pair{0};
   std::atomic<bool> wants_key_frame{false};
 };
@@ -65,9 +66,13 @@ Status ClientCore::on_meta(std::span<const uint8_t> packet) {
   return status;
 }
 
-bool ClientCore::wants_key_frame() const { return impl_->wants_key_frame.load(std::memory_order_relaxed); }
+bool ClientCore::wants_key_frame() const {
+  return impl_->wants_key_frame.load(std::memory_order_relaxed);
+}
 
-const Pair* ClientCore::take_newest() { return impl_->pairs.take(); }
+const Pair* ClientCore::take_newest() {
+  return impl_->pairs.take();
+}
 
 ClientStats ClientCore::stats() const {
   return {.pairs = impl_->pairs_published.load(std::memory_order_relaxed),

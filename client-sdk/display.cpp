@@ -13,13 +13,15 @@ namespace {
 
 Status check_view(const View& view, const DisplaySettings& settings) {
   if (view.width != settings.width || view.height != settings.height) {
-    return absl::InvalidArgumentError(absl::StrCat("the view is ", view.width, "x", view.height, " pixels, but the display was made for ",
-        settings.width, "x", settings.height));
+    return absl::InvalidArgumentError(absl::StrCat("the view is ", view.width, "x", view.height,
+                                                   " pixels, but the display was made for ", settings.width,
+                                                   "x", settings.height));
   }
   const Fov& fov = view.fov;
   if (!(fov.right > fov.left) || !(fov.up > fov.down) || !(view.near_m > 0)) {
-    return absl::InvalidArgumentError(absl::StrCat("the view's frustum is empty: tangents ", fov.left, "..", fov.right, ", ",
-                                                   fov.down, "..", fov.up, ", near ", view.near_m, " m"));
+    return absl::InvalidArgumentError(absl::StrCat("the view's frustum is empty: tangents ", fov.left, "..",
+                                                   fov.right, ", ", fov.down, "..", fov.up, ", near ",
+                                                   view.near_m, " m"));
   }
   return absl::OkStatus();
 }

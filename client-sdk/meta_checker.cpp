@@ -43,7 +43,8 @@ Status check_side(const char* what, uint32_t texels) {
 }
 
 Status check_mesh(size_t entry, const NewMesh& mesh) {
-  if (!(mesh.step > 0) || !std::isfinite(mesh.step)) return bad("meshes.step of entry ", entry, " is ", mesh.step);
+  if (!(mesh.step > 0) || !std::isfinite(mesh.step))
+    return bad("meshes.step of entry ", entry, " is ", mesh.step);
   for (double offset : mesh.offset) {
     if (!std::isfinite(offset)) return bad("meshes.offset of entry ", entry, " is ", offset);
   }
@@ -91,9 +92,11 @@ Status check_block(size_t entry, const PatchPlacement& p, uint32_t atlas_width, 
     return bad("placements.log_w, log_h of entry ", entry, " are ", int{p.log_w}, ", ", int{p.log_h},
                "; they must be 1 to 8");
   }
-  if (p.x % 2 != 0 || p.y % 2 != 0 || p.x + (1u << p.log_w) > atlas_width || p.y + (1u << p.log_h) > atlas_height) {
-    return bad("placements.x, y of entry ", entry, " are ", p.x, ", ", p.y, ": a block of ", 1u << p.log_w, "x",
-               1u << p.log_h, " must lie at even texels inside the atlas of ", atlas_width, "x", atlas_height);
+  if (p.x % 2 != 0 || p.y % 2 != 0 || p.x + (1u << p.log_w) > atlas_width ||
+      p.y + (1u << p.log_h) > atlas_height) {
+    return bad("placements.x, y of entry ", entry, " are ", p.x, ", ", p.y, ": a block of ", 1u << p.log_w,
+               "x", 1u << p.log_h, " must lie at even texels inside the atlas of ", atlas_width, "x",
+               atlas_height);
   }
   return absl::OkStatus();
 }
@@ -120,8 +123,9 @@ Status MetaChecker::check(const MetaFrame& frame) {
     return bad("frame is ", frame.frame, ", not newer than ", *newest_, " before it");
   }
   if (!complete_ && !frame.full_state) {
-    return absl::FailedPreconditionError(absl::StrCat("meta frame ", frame.frame,
-        " builds on a frame that is missing or was damaged; waiting for one with full_state"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("meta frame ", frame.frame,
+                     " builds on a frame that is missing or was damaged; waiting for one with full_state"));
   }
   Holdings holdings = frame.full_state ? Holdings{} : std::move(holdings_);
   const Status status = check_content(frame, holdings);
@@ -134,7 +138,8 @@ Status MetaChecker::check(const MetaFrame& frame) {
 Status MetaChecker::check_content(const MetaFrame& frame, Holdings& held) {
   TESSERA_RETURN_IF_ERROR(check_side("atlas_width", frame.atlas_width));
   TESSERA_RETURN_IF_ERROR(check_side("atlas_height", frame.atlas_height));
-  if (!frame.full_state && (frame.atlas_width != held.atlas_width || frame.atlas_height != held.atlas_height)) {
+  if (!frame.full_state &&
+      (frame.atlas_width != held.atlas_width || frame.atlas_height != held.atlas_height)) {
     return bad("the atlas is ", frame.atlas_width, "x", frame.atlas_height, " after ", held.atlas_width, "x",
                held.atlas_height, "; its size may change only with full_state");
   }
@@ -152,7 +157,8 @@ Status MetaChecker::check_content(const MetaFrame& frame, Holdings& held) {
   size_t entry = 0;
   for (const auto& mesh : frame.meshes) TESSERA_RETURN_IF_ERROR(check_mesh(entry++, mesh));
   entry = 0;
-  for (const auto& vertex : frame.vertices) TESSERA_RETURN_IF_ERROR(check_vertex(entry++, vertex, held.meshes));
+  for (const auto& vertex : frame.vertices)
+    TESSERA_RETURN_IF_ERROR(check_vertex(entry++, vertex, held.meshes));
   entry = 0;
   for (const auto& object : frame.objects) {
     TESSERA_RETURN_IF_ERROR(check_transform("objects", entry++, object.transform));

@@ -1,5 +1,5 @@
-// Decides whether a decoded meta frame makes sense after those before it. The packets come from the network: what passes
-// here can be applied and drawn without further tests.
+// Decides whether a decoded meta frame makes sense after those before it. The packets come from the network:
+// what passes here can be applied and drawn without further tests.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@
 
 namespace tessera::client {
 
-// Knows only what has been announced so far, not the scene itself, so a frame is judged when it arrives even if it is
-// applied later.
+// Knows only what has been announced so far, not the scene itself, so a frame is judged when it arrives even
+// if it is applied later.
 class MetaChecker {
  public:
-  // InvalidArgument names the field, the value and the limit; the frame then counts as missing, and until a frame with
-  // full_state every further one is refused with FailedPrecondition.
+  // InvalidArgument names the field, the value and the limit; the frame then counts as missing, and until a
+  // frame with full_state every further one is refused with FailedPrecondition.
   Status check(const geometry_compression::MetaFrame& frame);
   // A packet that could not even be decoded.
   void on_missing_frame() { complete_ = false; }

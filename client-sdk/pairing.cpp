@@ -6,7 +6,8 @@
 namespace tessera::client {
 namespace {
 
-void copy_plane(const uint8_t* source, uint32_t stride, uint32_t width, uint32_t height, std::vector<uint8_t>& out) {
+void copy_plane(const uint8_t* source, uint32_t stride, uint32_t width, uint32_t height,
+                std::vector<uint8_t>& out) {
   out.resize(size_t{width} * height);
   for (uint32_t row = 0; row < height; ++row) {
     std::copy_n(source + size_t{row} * stride, width, out.data() + size_t{row} * width);
@@ -92,8 +93,9 @@ Status Pairing::complete_front() {
   YuvImage& picture = waiting_.front().picture;
   Status status;
   if (picture.width != store_.state().atlas_width || picture.height != store_.state().atlas_height) {
-    status = absl::InvalidArgumentError(absl::StrCat("atlas of frame ", frame, " is ", picture.width, "x", picture.height,
-        ", but its meta frame says ", store_.state().atlas_width, "x", store_.state().atlas_height));
+    status = absl::InvalidArgumentError(absl::StrCat(
+        "atlas of frame ", frame, " is ", picture.width, "x", picture.height, ", but its meta frame says ",
+        store_.state().atlas_width, "x", store_.state().atlas_height));
   } else {
     Pair& pair = pairs_.back();
     pair.frame = frame;

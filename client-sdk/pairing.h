@@ -1,11 +1,12 @@
 // Brings decoded atlas pictures and meta frames together by frame number, and hands over complete pairs only.
 //
-// A meta frame changes the scene for good, so it waits until the atlas of its own frame has come, or is known to be lost:
-// otherwise frame N would be drawn with the placements of frame N+1. Both queues are bounded:
+// A meta frame changes the scene for good, so it waits until the atlas of its own frame has come, or is known
+// to be lost: otherwise frame N would be drawn with the placements of frame N+1. Both queues are bounded:
 // - held meta frames: when there are too many, the oldest is applied and its frame can no longer be shown;
-// - waiting pictures: when there are too many, one is dropped from where they lie closest, never the oldest (the next
-//   that can be completed) nor the newest (what the viewer wants). So a late meta channel lowers the rate of pairs evenly,
-//   but never stops them.
+// - waiting pictures: when there are too many, one is dropped from where they lie closest, never the oldest
+// (the next
+//   that can be completed) nor the newest (what the viewer wants). So a late meta channel lowers the rate of
+//   pairs evenly, but never stops them.
 #pragma once
 
 #include <cstddef>
@@ -28,8 +29,8 @@ class Pairing {
 
   explicit Pairing(TripleBuffer<Pair>& pairs) : pairs_(pairs) {}
 
-  // A decoded picture whose reference chain is intact (VideoDecoder sees to that). Errors: its size is not what its meta
-  // frame says.
+  // A decoded picture whose reference chain is intact (VideoDecoder sees to that). Errors: its size is not
+  // what its meta frame says.
   Status on_atlas(FrameNumber frame, const YuvView& picture);
   // A decoded meta frame, in order. Errors: see MetaChecker, and as above.
   Status on_meta(const geometry_compression::MetaFrame& meta);

@@ -56,7 +56,8 @@ void SceneStore::append(const MetaFrame& frame) {
 int SceneStore::group_of(const Patch& patch) const {
   const ObjectState& object = state_.objects[patch.object];
   if (object.masked) {
-    return static_cast<int>(object.double_sided ? RecordGroup::masked_double_sided : RecordGroup::masked_single_sided);
+    return static_cast<int>(object.double_sided ? RecordGroup::masked_double_sided
+                                                : RecordGroup::masked_single_sided);
   }
   return static_cast<int>(object.double_sided ? RecordGroup::double_sided : RecordGroup::single_sided);
 }

@@ -1,4 +1,5 @@
-// The client's own copy of the scene, kept current by meta frames. A frame costs time in proportion to what it changes.
+// The client's own copy of the scene, kept current by meta frames. A frame costs time in proportion to what
+// it changes.
 #pragma once
 
 #include <array>
@@ -15,7 +16,8 @@ class SceneStore {
   // `frame` has passed MetaChecker::check(); frames come in order, each once.
   void apply(const geometry_compression::MetaFrame& frame);
   const SceneState& state() const { return state_; }
-  // Brings an earlier copy (or an empty state) up to date; reuses its memory and copies only vertices that it lacks.
+  // Brings an earlier copy (or an empty state) up to date; reuses its memory and copies only vertices that it
+  // lacks.
   void copy_to(SceneState& copy) const;
 
  private:
@@ -38,7 +40,8 @@ class SceneStore {
   SceneState state_;
   std::vector<geometry_compression::NewMesh> meshes_;
   std::vector<Patch> patches_;
-  // Who a record belongs to: patch << 2 | triangle. A record that is removed is replaced by the last of its group.
+  // Who a record belongs to: patch << 2 | triangle. A record that is removed is replaced by the last of its
+  // group.
   std::array<std::vector<uint32_t>, kRecordGroups> owners_;
 };
 

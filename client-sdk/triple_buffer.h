@@ -1,5 +1,5 @@
-// The newest value from one writing thread to one reading thread, without locks or waiting: of three slots each side owns
-// one, and they trade theirs for the third.
+// The newest value from one writing thread to one reading thread, without locks or waiting: of three slots
+// each side owns one, and they trade theirs for the third.
 #pragma once
 
 #include <array>

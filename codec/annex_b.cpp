@@ -8,7 +8,9 @@ namespace {
 constexpr uint8_t kUserDataUnregistered = 5;
 constexpr size_t kTagSize = sizeof(kFrameUuid) + 8;
 
-bool is_slice(Nal nal) { return type_of(nal) == NalType::slice || type_of(nal) == NalType::idr_slice; }
+bool is_slice(Nal nal) {
+  return type_of(nal) == NalType::slice || type_of(nal) == NalType::idr_slice;
+}
 
 void append(std::vector<uint8_t>& out, Nal nal) {
   out.insert(out.end(), {0, 0, 0, 1});

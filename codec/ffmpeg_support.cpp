@@ -14,8 +14,9 @@ thread_local std::string last_error;
 void on_log(void* context, int level, const char* format, va_list arguments) {
   if (level > AV_LOG_WARNING) return;
   std::array<char, 512> line{};
-  int print_prefix = 1;
-  av_log_format_line2(context, level, format, arguments, line.data(), static_cast<int>(line.size()), &print_prefix);
+  int print_prefix = 0;  // it would be an address
+  av_log_format_line2(context, level, format, arguments, line.data(), static_cast<int>(line.size()),
+                      &print_prefix);
   std::string text = line.data();
   while (!text.empty() && text.back() == '\n') text.pop_back();
   spdlog::debug("FFmpeg: {}", text);
@@ -29,7 +30,9 @@ void route_ffmpeg_log() {
   std::call_once(once, [] { av_log_set_callback(on_log); });
 }
 
-void forget_ffmpeg_error() { last_error.clear(); }
+void forget_ffmpeg_error() {
+  last_error.clear();
+}
 
 std::string ffmpeg_error(int code) {
   std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};

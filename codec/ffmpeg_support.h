@@ -19,11 +19,12 @@ using AvCodecContext = std::unique_ptr<AVCodecContext, AvDeleter>;
 using AvFrame = std::unique_ptr<AVFrame, AvDeleter>;
 using AvPacket = std::unique_ptr<AVPacket, AvDeleter>;
 
-// FFmpeg prints to standard error by itself, also what is normal for us (a probe that finds nothing, damaged input). From
-// the first call on, the whole process's FFmpeg messages go to our log at level debug.
+// FFmpeg prints to standard error by itself, also what is normal for us (a probe that finds nothing, damaged
+// input). From the first call on, the whole process's FFmpeg messages go to our log at level debug.
 void route_ffmpeg_log();
 
-// An FFmpeg error code in words, with this thread's last FFmpeg error message if there was one since forget_ffmpeg_error().
+// An FFmpeg error code in words, with this thread's last FFmpeg error message if there was one since
+// forget_ffmpeg_error().
 std::string ffmpeg_error(int code);
 void forget_ffmpeg_error();
 

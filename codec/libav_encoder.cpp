@@ -28,10 +28,12 @@ void configure_x264(AVCodecContext& context, const VideoSettings& settings) {
   set_option(context, "forced-idr", "1");
   // The quantiser that a picture converges to when it stands still: SSIM 0.998, then next to no bits.
   set_option(context, "crf", "10");
-  // Each frame is as good as its budget allows, so no quantiser curve over time (qcomp=1). Measured on still, changing and
-  // moving atlases: psy=0 and a weak deblocking filter raise SSIM by 0.002, 8x8dct by 0.006 (so the profile is High).
-  set_option(context, "x264-params",
-             "cabac=0:ref=1:scenecut=0:mbtree=0:weightp=0:qcomp=1:sliced-threads=0:8x8dct=1:psy=0:deblock=-2,-2");
+  // Each frame is as good as its budget allows, so no quantiser curve over time (qcomp=1). Measured on still,
+  // changing and moving atlases: psy=0 and a weak deblocking filter raise SSIM by 0.002, 8x8dct by 0.006 (so
+  // the profile is High).
+  set_option(
+      context, "x264-params",
+      "cabac=0:ref=1:scenecut=0:mbtree=0:weightp=0:qcomp=1:sliced-threads=0:8x8dct=1:psy=0:deblock=-2,-2");
 }
 
 void configure_nvenc(AVCodecContext& context, const VideoSettings&) {
@@ -47,10 +49,11 @@ void configure_nvenc(AVCodecContext& context, const VideoSettings&) {
 
 }  // namespace
 
-const Flavour kX264 = {"libx264", configure_x264, true};
-const Flavour kNvenc = {"h264_nvenc", configure_nvenc, false};
+const Flavour kX264 = {"libx264", configure_x264, false, true};
+const Flavour kNvenc = {"h264_nvenc", configure_nvenc, true, false};
 
-StatusOr<std::unique_ptr<LibavEncoder>> LibavEncoder::open(const Flavour& flavour, const VideoSettings& settings) {
+StatusOr<std::unique_ptr<LibavEncoder>> LibavEncoder::open(const Flavour& flavour,
+                                                           const VideoSettings& settings) {
   std::unique_ptr<LibavEncoder> encoder(new LibavEncoder(flavour, settings));
   encoder->frame_.reset(av_frame_alloc());
   encoder->packet_.reset(av_packet_alloc());
@@ -89,17 +92,19 @@ Status LibavEncoder::reopen(double budget_bits) {
   return absl::OkStatus();
 }
 
-// Every frame gets a buffer of its own size, which refills completely from one to the next. libx264 cuts what is in the
-// buffer down to the new size before it starts a frame, so a smaller budget holds at once; a larger one holds from the
-// frame after on, because the buffer filled up only to the old size.
+// Every frame gets a buffer of its own size, which refills completely from one to the next. libx264 cuts what
+// is in the buffer down to the new size before it starts a frame, so a smaller budget holds at once; a larger
+// one holds from the frame after on, because the buffer filled up only to the old size.
 void LibavEncoder::set_budget(double budget_bits) {
   const double units = std::floor((budget_bits * kUseOfMargin - kTagBits) / kRateUnit);
   const double size = kRateUnit * std::clamp(units, 1.0, 2e6);
   context_->rc_buffer_size = static_cast<int>(size);
   context_->rc_max_rate = static_cast<int64_t>(std::ceil(size * settings_.frames_per_second));
+  if (flavour_.constant_bit_rate) context_->bit_rate = context_->rc_max_rate;
 }
 
-StatusOr<AccessUnit> LibavEncoder::encode(FrameNumber frame, const YuvView& picture, double budget_bits, bool key_frame) {
+StatusOr<AccessUnit> LibavEncoder::encode(FrameNumber frame, const YuvView& picture, double budget_bits,
+                                          bool key_frame) {
   if (!(budget_bits > 0))
     return absl::InvalidArgumentError(absl::StrFormat("encode: a budget of %g bits", budget_bits));
   key_frame = key_frame || fresh_;
@@ -121,9 +126,9 @@ StatusOr<AccessUnit> LibavEncoder::encode(FrameNumber frame, const YuvView& pict
 
 Status LibavEncoder::fill(const YuvView& picture, bool key_frame) {
   if (picture.width != settings_.width || picture.height != settings_.height)
-    return absl::InvalidArgumentError(absl::StrFormat("encode: the picture is %ux%u, the encoder was made for %ux%u",
-                                                      picture.width, picture.height, settings_.width,
-                                                      settings_.height));
+    return absl::InvalidArgumentError(
+        absl::StrFormat("encode: the picture is %ux%u, the encoder was made for %ux%u", picture.width,
+                        picture.height, settings_.width, settings_.height));
   AVFrame& f = *frame_;
   f.width = context_->width;
   f.height = context_->height;
@@ -138,7 +143,8 @@ Status LibavEncoder::fill(const YuvView& picture, bool key_frame) {
     const uint32_t width = plane == 0 ? picture.width : picture.width / 2;
     const uint32_t height = plane == 0 ? picture.height : picture.height / 2;
     for (uint32_t row = 0; row < height; ++row)
-      std::copy_n(planes[plane] + size_t{row} * stride, width, f.data[plane] + ptrdiff_t{row} * f.linesize[plane]);
+      std::copy_n(planes[plane] + size_t{row} * stride, width,
+                  f.data[plane] + ptrdiff_t{row} * f.linesize[plane]);
   }
   f.pts = pts_++;
   f.pict_type = key_frame ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_P;

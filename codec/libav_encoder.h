@@ -12,23 +12,28 @@ struct Flavour {
   const char* codec;  // libavcodec's name
   // Sets private options on a context that has everything common.
   void (*configure)(AVCodecContext& context, const VideoSettings& settings);
-  // The budget of a frame can grow only by what the frame before left (see LibavEncoder): a key frame starts anew.
+  // Also give each frame's budget as bit rate (constant bit rate), not only as buffer.
+  bool constant_bit_rate;
+  // A budget that grows takes effect one frame late (set_budget), too late for a key frame: it starts with a
+  // new context.
   bool reopen_for_key_frames;
 };
 extern const Flavour kX264;
-extern const Flavour kNvenc;
+extern const Flavour kNvenc;  // written from FFmpeg's documentation; never run on such a device
 
 class LibavEncoder final : public VideoEncoder {
  public:
   // Unavailable, with FFmpeg's reason, if this encoder cannot be opened here.
   static StatusOr<std::unique_ptr<LibavEncoder>> open(const Flavour& flavour, const VideoSettings& settings);
 
-  StatusOr<AccessUnit> encode(FrameNumber frame, const YuvView& picture, double budget_bits, bool key_frame) override;
+  StatusOr<AccessUnit> encode(FrameNumber frame, const YuvView& picture, double budget_bits,
+                              bool key_frame) override;
   const std::string& choice() const override { return choice_; }
   void set_choice(std::string choice) { choice_ = std::move(choice); }
 
  private:
-  LibavEncoder(const Flavour& flavour, const VideoSettings& settings) : flavour_(flavour), settings_(settings) {}
+  LibavEncoder(const Flavour& flavour, const VideoSettings& settings)
+      : flavour_(flavour), settings_(settings) {}
 
   Status reopen(double budget_bits);
   void set_budget(double budget_bits);
@@ -42,7 +47,7 @@ class LibavEncoder final : public VideoEncoder {
   AvFrame frame_;
   AvPacket packet_;
   int64_t pts_ = 0;
-  bool fresh_ = true;              // no frame since the context was opened
+  bool fresh_ = true;  // no frame since the context was opened
   bool last_was_key_frame_ = false;
   FrameNumber last_frame_ = 0;
 };

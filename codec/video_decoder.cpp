@@ -13,8 +13,8 @@ struct VideoDecoder::Impl {
   AvCodecContext context;
   AvFrame frame;
   AvPacket packet;
-  std::vector<uint8_t> input;             // with FFmpeg's padding
-  std::optional<FrameNumber> reference;   // the last frame, while the chain behind it is intact
+  std::vector<uint8_t> input;            // with FFmpeg's padding
+  std::optional<FrameNumber> reference;  // the last frame, while the chain behind it is intact
   bool too_large = false;
   bool wrong_format = false;
 
@@ -57,14 +57,15 @@ Status VideoDecoder::Impl::reopen() {
 Status VideoDecoder::Impl::admit(std::span<const uint8_t> access_unit, FrameTag& tag) const {
   const AccessUnitInfo info = inspect(access_unit);
   if (!info.has_slice) return absl::InvalidArgumentError("access unit: no picture in it");
-  if (!info.tag) return absl::InvalidArgumentError("access unit: no frame number (SEI user data with our UUID)");
+  if (!info.tag)
+    return absl::InvalidArgumentError("access unit: no frame number (SEI user data with our UUID)");
   tag = *info.tag;
   if (info.key_frame) return absl::OkStatus();
   if (!reference)
     return absl::InvalidArgumentError(absl::StrFormat("frame %u: waiting for a key frame", tag.frame));
   if (tag.reference != *reference)
-    return absl::InvalidArgumentError(absl::StrFormat("frame %u builds on frame %u, but the last one decoded is %u",
-                                                      tag.frame, tag.reference, *reference));
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "frame %u builds on frame %u, but the last one decoded is %u", tag.frame, tag.reference, *reference));
   return absl::OkStatus();
 }
 
@@ -109,18 +110,21 @@ StatusOr<DecodedFrame> VideoDecoder::decode(std::span<const uint8_t> access_unit
   Impl& d = *impl_;
   FrameTag tag;
   Status status = d.admit(access_unit, tag);
-  if (status.ok()) status = d.decode_picture(access_unit);
+  d.reference.reset();
+  if (!status.ok()) return status;
+  status = d.decode_picture(access_unit);
   if (!status.ok()) {
-    // Whatever a damaged stream left in FFmpeg's state must not reach the next key frame.
-    avcodec_flush_buffers(d.context.get());
-    d.reference.reset();
+    // What a damaged picture leaves in FFmpeg's decoder survives avcodec_flush_buffers and spoils the next
+    // key frame.
+    TESSERA_RETURN_IF_ERROR(d.reopen());
     return status;
   }
   d.reference = tag.frame;
   const AVFrame& f = *d.frame;
-  return DecodedFrame{tag.frame,
-                      {static_cast<uint32_t>(f.width), static_cast<uint32_t>(f.height), f.data[0], f.data[1], f.data[2],
-                       static_cast<uint32_t>(f.linesize[0]), static_cast<uint32_t>(f.linesize[1])}};
+  return DecodedFrame{
+      tag.frame,
+      {static_cast<uint32_t>(f.width), static_cast<uint32_t>(f.height), f.data[0], f.data[1], f.data[2],
+       static_cast<uint32_t>(f.linesize[0]), static_cast<uint32_t>(f.linesize[1])}};
 }
 
 }  // namespace tessera::codec

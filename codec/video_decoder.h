@@ -20,11 +20,12 @@ struct DecodedFrame {
 class VideoDecoder {
  public:
   // Pictures larger than this are refused (ResourceExhausted).
-  static StatusOr<std::unique_ptr<VideoDecoder>> create(uint32_t max_width = 8192, uint32_t max_height = 8192);
+  static StatusOr<std::unique_ptr<VideoDecoder>> create(uint32_t max_width = 8192,
+                                                        uint32_t max_height = 8192);
   ~VideoDecoder();
 
-  // One whole access unit in, its picture out (no reordering, no delay). InvalidArgument for damaged data, a missing frame
-  // number, or a format other than 8-bit 4:2:0; the decoder then waits for the next key frame.
+  // One whole access unit in, its picture out (no reordering, no delay). InvalidArgument for damaged data, a
+  // missing frame number, or a format other than 8-bit 4:2:0; the decoder then waits for the next key frame.
   StatusOr<DecodedFrame> decode(std::span<const uint8_t> access_unit);
 
  private:

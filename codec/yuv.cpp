@@ -6,8 +6,9 @@
 namespace tessera::codec {
 namespace {
 
-// BT.709 (Kr = 0.2126, Kb = 0.0722), limited range, times 2^16; codec/shaders/rgb_to_yuv.comp has the same integers.
-// Luma: 219 / 255 * (Kr, Kg, Kb). Chroma: 224 / 255 / 2 * (…) / (1 - K); each row sums to 0, so that greys are 128.
+// BT.709 (Kr = 0.2126, Kb = 0.0722), limited range, times 2^16; codec/shaders/rgb_to_yuv.comp has the same
+// integers. Luma: 219 / 255 * (Kr, Kg, Kb). Chroma: 224 / 255 / 2 * (…) / (1 - K); each row sums to 0, so
+// that greys are 128.
 constexpr int32_t kShift = 16;
 constexpr int32_t kLuma[3] = {11966, 40254, 4064};
 constexpr int32_t kBlue[3] = {-6596, -22189, 28785};
@@ -41,7 +42,8 @@ YuvImage rgb_to_yuv(const Image8& image) {
   for (uint32_t y = 0; y < image.height; y += 2)
     for (uint32_t x = 0; x < image.width; x += 2) {
       int32_t sum[3] = {};
-      for (const uint8_t* texel : {image.at(x, y), image.at(x + 1, y), image.at(x, y + 1), image.at(x + 1, y + 1)})
+      for (const uint8_t* texel :
+           {image.at(x, y), image.at(x + 1, y), image.at(x, y + 1), image.at(x + 1, y + 1)})
         for (int c = 0; c < 3; ++c) sum[c] += texel[c];
       out.u.push_back(chroma(kBlue, sum));
       out.v.push_back(chroma(kRed, sum));
@@ -68,8 +70,8 @@ Image8 yuv_to_rgb(const YuvView& yuv) {
 }
 
 YuvView view_of(const YuvImage& image) {
-  return {image.width,     image.height,    image.y.data(), image.u.data(),
-          image.v.data(), image.width, image.width / 2};
+  return {image.width,    image.height, image.y.data(), image.u.data(),
+          image.v.data(), image.width,  image.width / 2};
 }
 
 }  // namespace tessera::codec

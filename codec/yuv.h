@@ -1,5 +1,5 @@
-// The same colour conversion on the CPU: BT.709, limited range, chroma = mean of 2x2, and back with chroma replicated
-// (nearest), as the client's shader does it. The reference for the device versions and for tests.
+// The same colour conversion on the CPU: BT.709, limited range, chroma = mean of 2x2, and back with chroma
+// replicated (nearest), as the client's shader does it. The reference for the device versions and for tests.
 #pragma once
 
 #include <cstddef>

@@ -16,7 +16,9 @@ struct Push {
 // Texels of one work group of rgb_to_yuv.comp.
 constexpr uint32_t kGroupWidth = 64, kGroupHeight = 16;
 
-constexpr uint32_t divided_up(uint32_t a, uint32_t b) { return (a + b - 1) / b; }
+constexpr uint32_t divided_up(uint32_t a, uint32_t b) {
+  return (a + b - 1) / b;
+}
 
 }  // namespace
 
@@ -32,17 +34,18 @@ struct YuvConverter::Impl {
 YuvConverter::YuvConverter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 YuvConverter::~YuvConverter() = default;
 
-StatusOr<std::unique_ptr<YuvConverter>> YuvConverter::create(gpu::Device& device, uint32_t width, uint32_t height) {
+StatusOr<std::unique_ptr<YuvConverter>> YuvConverter::create(gpu::Device& device, uint32_t width,
+                                                             uint32_t height) {
   if (width == 0 || height == 0 || width % 8 != 0 || height % 2 != 0)
-    return absl::InvalidArgumentError(
-        absl::StrFormat("colour conversion of %ux%u: the width must be a multiple of 8, the height even", width, height));
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "colour conversion of %ux%u: the width must be a multiple of 8, the height even", width, height));
   auto impl = std::make_unique<Impl>();
   impl->width = width;
   impl->height = height;
   TESSERA_ASSIGN_OR_RETURN(impl->planes, gpu::Buffer::create(device, uint64_t{width} * height * 3 / 2,
                                                              gpu::Memory::readback, "yuv planes"));
-  const std::array<gpu::Binding, 2> bindings = {{{0, gpu::BindingKind::storage_image},
-                                                 {1, gpu::BindingKind::storage_buffer}}};
+  const std::array<gpu::Binding, 2> bindings = {
+      {{0, gpu::BindingKind::storage_image}, {1, gpu::BindingKind::storage_buffer}}};
   TESSERA_ASSIGN_OR_RETURN(impl->layout, gpu::BindLayout::create(device, bindings));
   TESSERA_ASSIGN_OR_RETURN(impl->group, gpu::BindGroup::create(device, impl->layout));
   impl->group.set(1, impl->planes);
@@ -61,7 +64,8 @@ Status YuvConverter::record(gpu::Commands& commands, const gpu::Image& image) {
                                                       image.width(), image.height(), c.width, c.height));
   const gpu::Format format = image.desc().format;
   if (!image.desc().storage || (format != gpu::Format::rgba8_srgb && format != gpu::Format::rgba8_unorm))
-    return absl::InvalidArgumentError("colour conversion: the image must be RGBA8 and bindable as storage image");
+    return absl::InvalidArgumentError(
+        "colour conversion: the image must be RGBA8 and bindable as storage image");
   if (c.bound != &image.impl()) {
     c.group.set(0, image);
     c.bound = &image.impl();

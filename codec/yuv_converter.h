@@ -1,4 +1,5 @@
-// Atlas image (sRGB RGBA8 on the device) → I420 in mapped memory, BT.709 limited range: 1.5 bytes a texel read back.
+// Atlas image (sRGB RGBA8 on the device) → I420 in mapped memory, BT.709 limited range: 1.5 bytes a texel
+// read back.
 #pragma once
 
 #include <memory>
@@ -15,8 +16,8 @@ class YuvConverter {
   static StatusOr<std::unique_ptr<YuvConverter>> create(gpu::Device& device, uint32_t width, uint32_t height);
   ~YuvConverter();
 
-  // `image` has the size given to create() and stays the same object between calls where possible (rebinding is cheap,
-  // but not free).
+  // `image` has the size given to create() and stays the same object between calls where possible (rebinding
+  // is cheap, but not free).
   Status record(gpu::Commands& commands, const gpu::Image& image);
   // After that work is done, until the next record().
   YuvView result() const;

@@ -1,7 +1,7 @@
 // The only way to touch wire bytes: bits, most significant first, and exponential-Golomb codes of order k.
 //
-// Order-k code of v: x = v + 2^k written in n + 1 binary digits, behind n - k zeros. Short for v < 2^k, and any 32-bit
-// value has a code (of at most 65 bits).
+// Order-k code of v: x = v + 2^k written in n + 1 binary digits, behind n - k zeros. Short for v < 2^k, and
+// any 32-bit value has a code (of at most 65 bits).
 #pragma once
 
 #include <bit>
@@ -25,7 +25,9 @@ constexpr uint32_t exp_golomb_bits(uint32_t value, uint32_t order) {
 constexpr uint32_t zigzag(int32_t v) {
   return (static_cast<uint32_t>(v) << 1) ^ (v < 0 ? ~0u : 0u);
 }
-constexpr int32_t unzigzag(uint32_t v) { return static_cast<int32_t>((v >> 1) ^ (0u - (v & 1))); }
+constexpr int32_t unzigzag(uint32_t v) {
+  return static_cast<int32_t>((v >> 1) ^ (0u - (v & 1)));
+}
 
 class BitWriter {
  public:
@@ -61,8 +63,9 @@ class BitWriter {
   uint32_t free_ = 0;  // bits of the last byte
 };
 
-// Safe for untrusted input. The first read past the end, or of a code that no value has, makes ok() false for good; from
-// then on everything reads as 0. So a parser tests ok() where it would loop or allocate, and at its end.
+// Safe for untrusted input. The first read past the end, or of a code that no value has, makes ok() false for
+// good; from then on everything reads as 0. So a parser tests ok() where it would loop or allocate, and at
+// its end.
 class BitReader {
  public:
   explicit BitReader(std::span<const uint8_t> bytes) : bytes_(bytes) {}

@@ -1,5 +1,5 @@
-// A column: the values of one field over all items of a section, cut into runs of kRunLength. Each run has its own
-// exp-Golomb order, chosen by cost, or is all zeros and then takes no bits beside its 5-bit header.
+// A column: the values of one field over all items of a section, cut into runs of kRunLength. Each run has
+// its own exp-Golomb order, chosen by cost, or is all zeros and then takes no bits beside its 5-bit header.
 #pragma once
 
 #include <cstdint>
@@ -18,16 +18,22 @@ constexpr uint32_t kAllZeros = 31;  // in place of an order
 
 void write_column(BitWriter& out, std::span<const uint32_t> values);
 
-// Reads `count` values; memory grows with the runs that are really there. On failure (in.ok() false) the column is shorter.
+// Reads `count` values; memory grows with the runs that are really there. On failure (in.ok() false) the
+// column is shorter.
 std::vector<uint32_t> read_column(BitReader& in, uint32_t count);
 
-// A column of few distinct neighbours as (length - 1, zigzag delta to the run before) columns: vertices of one mesh, patches
-// of one object. The second function returns false if the runs do not add up to `count`.
+// A column of few distinct neighbours as (length - 1, zigzag delta to the run before) columns: vertices of
+// one mesh, patches of one object. The second function returns false if the runs do not add up to `count`.
 void write_repeats(BitWriter& out, std::span<const uint32_t> values);
-bool read_repeats(BitReader& in, uint32_t count, const std::function<void(uint32_t length, uint32_t value)>& on_run);
+bool read_repeats(BitReader& in, uint32_t count,
+                  const std::function<void(uint32_t length, uint32_t value)>& on_run);
 
 // Differences wrap modulo 2^32, so every pair of values has one.
-constexpr uint32_t delta(uint32_t value, uint32_t base) { return zigzag(static_cast<int32_t>(value - base)); }
-constexpr uint32_t undelta(uint32_t coded, uint32_t base) { return base + static_cast<uint32_t>(unzigzag(coded)); }
+constexpr uint32_t delta(uint32_t value, uint32_t base) {
+  return zigzag(static_cast<int32_t>(value - base));
+}
+constexpr uint32_t undelta(uint32_t coded, uint32_t base) {
+  return base + static_cast<uint32_t>(unzigzag(coded));
+}
 
 }  // namespace tessera::geometry_compression

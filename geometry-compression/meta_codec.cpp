@@ -20,7 +20,8 @@ struct Counts {
 
 Counts counts_of(const MetaFrame& f) {
   const auto size = [](const auto& v) { return static_cast<uint32_t>(v.size()); };
-  return {size(f.meshes),  size(f.vertices), size(f.objects), size(f.moved), size(f.patches), size(f.placements)};
+  return {size(f.meshes), size(f.vertices), size(f.objects),
+          size(f.moved),  size(f.patches),  size(f.placements)};
 }
 
 void write_header(BitWriter& out, const MetaFrame& frame) {
@@ -37,7 +38,9 @@ void write_header(BitWriter& out, const MetaFrame& frame) {
   out.put_unsigned(guess_first_vertex(frame), kFirstVertexOrder);
 }
 
-bool valid_atlas_side(uint32_t side) { return side % 2 == 0 && side <= kMaxAtlasSide; }
+bool valid_atlas_side(uint32_t side) {
+  return side % 2 == 0 && side <= kMaxAtlasSide;
+}
 
 std::string over_limit(const char* what, uint32_t count, uint32_t limit) {
   return std::to_string(count) + " " + what + " are more than the limit of " + std::to_string(limit);
@@ -93,8 +96,10 @@ std::string read_all(BitReader& in, MetaFrame& out, const MetaLimits& limits) {
   if (auto e = read_meshes(in, n.meshes, out.meshes); !e.empty() || !in.ok()) return e;
   if (auto e = read_objects(in, n.objects, out.objects); !e.empty() || !in.ok()) return e;
   if (auto e = read_moved(in, n.moved, out.moved); !e.empty() || !in.ok()) return e;
-  if (auto e = read_patches(in, n.patches, header.first_vertex, out.patches); !e.empty() || !in.ok()) return e;
-  if (auto e = read_vertices(in, n.vertices, out.patches, header.first_vertex, out.vertices); !e.empty() || !in.ok())
+  if (auto e = read_patches(in, n.patches, header.first_vertex, out.patches); !e.empty() || !in.ok())
+    return e;
+  if (auto e = read_vertices(in, n.vertices, out.patches, header.first_vertex, out.vertices);
+      !e.empty() || !in.ok())
     return e;
   if (auto e = read_placements(in, n.placements, out.placements); !e.empty() || !in.ok()) return e;
   return read_end(in);
@@ -117,7 +122,7 @@ std::vector<uint8_t> encode(const MetaFrame& frame, MetaBits* bits) {
   assert(valid(frame));
   BitWriter out;
   uint64_t done = 0;
-  const auto account = [&](uint64_t MetaBits::* section) {
+  const auto account = [&](uint64_t MetaBits::*section) {
     if (bits) bits->*section = out.bit_count() - done;
     done = out.bit_count();
   };

@@ -1,6 +1,6 @@
-// Patches: whose they are, how many triangles, and which vertices. A vertex id is named by a rule: the next new vertex, a
-// corner of the patch before, … Each corner keeps its rules in the order of their last use, so that the regular parts of a
-// mesh take about one bit a corner.
+// Patches: whose they are, how many triangles, and which vertices. A vertex id is named by a rule: the next
+// new vertex, a corner of the patch before, … Each corner keeps its rules in the order of their last use, so
+// that the regular parts of a mesh take about one bit a corner.
 #include <algorithm>
 #include <numeric>
 
@@ -10,8 +10,9 @@
 namespace tessera::geometry_compression {
 namespace {
 
-// Rules by number: 0 = the newest vertex + 1; 1..5 = corner 0..4 of the patch before; 6 = 1 after the same corner of the
-// patch before; 7 = 1 before it; 8 = spelled out, as difference to the same corner of the patch before.
+// Rules by number: 0 = the newest vertex + 1; 1..5 = corner 0..4 of the patch before; 6 = 1 after the same
+// corner of the patch before; 7 = 1 before it; 8 = spelled out, as difference to the same corner of the patch
+// before.
 constexpr int kRules = 9;
 constexpr int kSpelledOut = 8;
 
@@ -129,7 +130,8 @@ CornerColumns read_corner_columns(BitReader& in, const std::vector<NewPatch>& pa
 
 }  // namespace
 
-std::string read_patches(BitReader& in, uint32_t count, uint32_t first_vertex, std::vector<NewPatch>& patches) {
+std::string read_patches(BitReader& in, uint32_t count, uint32_t first_vertex,
+                         std::vector<NewPatch>& patches) {
   if (std::string error = read_triangles(in, count, patches); !error.empty() || !in.ok()) return error;
   uint32_t next_patch = 0;
   if (!read_repeats(in, count, [&](uint32_t length, uint32_t object) {

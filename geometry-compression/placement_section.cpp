@@ -1,5 +1,5 @@
-// Placements: which patches, and where their samples lie. Blocks of power-of-two sides mostly stand on multiples of their
-// sides, and one after another.
+// Placements: which patches, and where their samples lie. Blocks of power-of-two sides mostly stand on
+// multiples of their sides, and one after another.
 #include <algorithm>
 
 #include "geometry-compression/columns.h"
@@ -108,7 +108,8 @@ std::string read_block(const BlockColumns& c, size_t i, size_t& next_position, A
                        const PatchPlacement& previous, PatchPlacement& p) {
   const uint32_t log_w = undelta(c.log_w[i], previous.log_w);
   const uint32_t log_h = undelta(c.log_h[i], log_w);
-  if (log_w < kMinLog || log_w > kMaxLog || log_h < kMinLog || log_h > kMaxLog) return "a block's log is not 1..8";
+  if (log_w < kMinLog || log_w > kMaxLog || log_h < kMinLog || log_h > kMaxLog)
+    return "a block's log is not 1..8";
   if (c.transposed[i] > 1 || c.rule[i] > kBelow) return "unknown flag or position rule";
   p.log_w = static_cast<uint8_t>(log_w);
   p.log_h = static_cast<uint8_t>(log_h);
@@ -137,7 +138,8 @@ std::string read_blocks(BitReader& in, uint32_t count, std::vector<PatchPlacemen
   size_t next_block = 0, next_position = 0;
   for (PatchPlacement& p : placements) {
     if (p.kind != PlacementKind::block) continue;
-    if (std::string error = read_block(columns, next_block++, next_position, alignment, previous, p); !error.empty())
+    if (std::string error = read_block(columns, next_block++, next_position, alignment, previous, p);
+        !error.empty())
       return "placement of patch " + std::to_string(p.patch) + ": " + error;
     previous = p;
   }

@@ -1,5 +1,5 @@
-// Meshes, objects and moved objects: few, and mostly numbers without structure. Each number is one bit if it has the same
-// bits as in the item before, else a 0 bit and its IEEE 754 bits.
+// Meshes, objects and moved objects: few, and mostly numbers without structure. Each number is one bit if it
+// has the same bits as in the item before, else a 0 bit and its IEEE 754 bits.
 #include <bit>
 #include <cmath>
 

@@ -1,6 +1,6 @@
-// Vertices: the difference to a prediction. The patch that uses a vertex first tells what it is near: with three corners
-// known the fourth closes a parallelogram; else its edges are like those of the patch before; else it lies near their
-// mean; else near the mesh's last vertex.
+// Vertices: the difference to a prediction. The patch that uses a vertex first tells what it is near: with
+// three corners known the fourth closes a parallelogram; else its edges are like those of the patch before;
+// else it lies near their mean; else near the mesh's last vertex.
 #include <algorithm>
 #include <array>
 #include <optional>
@@ -14,7 +14,8 @@ namespace {
 constexpr int32_t kMaxCoordinate = (1 << 30) - 1;
 constexpr uint32_t kNobody = UINT32_MAX;
 
-// For each corner of each kind of patch: a + b - c of other corners, where all three are known (meta_frame.h: NewPatch).
+// For each corner of each kind of patch: a + b - c of other corners, where all three are known (meta_frame.h:
+// NewPatch).
 struct Parallelogram {
   int8_t a, b, c;
 };
@@ -54,7 +55,8 @@ class VertexPredictor {
 
   static Position position(const NewVertex& v) { return {v.q[0], v.q[1], v.q[2]}; }
   static int corner_of(const NewPatch& patch, uint32_t id) {
-    return static_cast<int>(std::find(patch.vertices.begin(), patch.vertices.end(), id) - patch.vertices.begin());
+    return static_cast<int>(std::find(patch.vertices.begin(), patch.vertices.end(), id) -
+                            patch.vertices.begin());
   }
 
   Corners known_corners(uint32_t patch, std::span<const NewVertex> known, uint32_t mesh) const {
@@ -128,8 +130,8 @@ void write_vertices(BitWriter& out, std::span<const NewVertex> vertices, std::sp
   write_repeats(out, meshes);
 }
 
-std::string read_vertices(BitReader& in, uint32_t count, std::span<const NewPatch> patches, uint32_t first_vertex,
-                          std::vector<NewVertex>& vertices) {
+std::string read_vertices(BitReader& in, uint32_t count, std::span<const NewPatch> patches,
+                          uint32_t first_vertex, std::vector<NewVertex>& vertices) {
   std::array<std::vector<uint32_t>, 3> residuals;
   for (auto& column : residuals) {
     column = read_column(in, count);
@@ -147,7 +149,8 @@ std::string read_vertices(BitReader& in, uint32_t count, std::span<const NewPatc
     NewVertex& vertex = vertices[i];
     const auto prediction = predictor.predict(std::span(vertices).first(i), vertex.mesh);
     for (int axis = 0; axis < 3; ++axis) {
-      vertex.q[axis] = static_cast<int32_t>(undelta(residuals[axis][i], static_cast<uint32_t>(prediction[axis])));
+      vertex.q[axis] =
+          static_cast<int32_t>(undelta(residuals[axis][i], static_cast<uint32_t>(prediction[axis])));
       if (vertex.q[axis] < -kMaxCoordinate || vertex.q[axis] > kMaxCoordinate)
         return "vertex " + std::to_string(i) + ": a coordinate is not below 2^30";
     }

@@ -18,7 +18,8 @@ enum class Memory {
 };
 
 // May be bound as storage, uniform, index or indirect buffer and copied in both directions. Contents start as
-// zeros. Move-only; destruction must wait for the work that uses it (see Device::submit).
+// zeros. A size of 0 is allowed, so that empty arrays need no special case. Move-only; destruction must wait
+// for the work that uses it (see Device::submit).
 class Buffer {
  public:
   static StatusOr<Buffer> create(Device& device, uint64_t bytes, Memory memory, std::string_view name);

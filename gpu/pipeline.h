@@ -39,8 +39,8 @@ class BindLayout {
   std::unique_ptr<Impl> impl_;
 };
 
-// One descriptor set. Every binding must be set before use (an unwritten one crashes old lavapipe). Not to be
-// changed while submitted work uses it.
+// One descriptor set. Every binding must be set before use: an unwritten one crashes old lavapipe, so
+// Commands::bind refuses it. Not to be changed while submitted work uses it.
 class BindGroup {
  public:
   static StatusOr<BindGroup> create(Device& device, const BindLayout& layout);
@@ -50,7 +50,7 @@ class BindGroup {
   ~BindGroup();
 
   void set(uint32_t binding, const Buffer& buffer);
-  void set(uint32_t binding, const Image& image);  // storage image
+  void set(uint32_t binding, const Image& image);  // storage image: mip 0, all layers
   void set(uint32_t binding, const Image& image, const Sampler& sampler, uint32_t array_element = 0);
   // Only mip level `mip` of the image, as storage image (depth pyramids).
   void set_mip(uint32_t binding, const Image& image, uint32_t mip, uint32_t array_element = 0);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <span>
+#include <vector>
 
 #include "pvs/shaders/compact.comp.spv.h"
 #include "pvs/shaders/cull.comp.spv.h"
@@ -12,11 +14,11 @@ namespace {
 
 // Also in pvs/shaders/visibility.glsl.
 constexpr uint32_t kGroupSize = 64;
-constexpr uint32_t kPyramidTile = 4;
+constexpr uint32_t kPyramidTile = 2;
 constexpr uint32_t kPyramidGroup = 8;
 
 // Set 2 of pvs/shaders/visibility.glsl.
-enum CullBinding : uint32_t { kInstanceBuckets, kWasVisible, kSurvivors, kGroupCounts, kDraws, kCounts, kPyramid, kDepth };
+enum CullBinding : uint32_t { kInstanceBuckets, kWasVisible, kSurvivors, kGroupCounts, kDraws, kCounts, kPyramid, kDepth, kBounds };
 
 // Push constants of cull.comp.
 struct CullPush {
@@ -42,6 +44,24 @@ struct LevelPush {
 };
 
 constexpr uint32_t groups(uint32_t items, uint32_t size) { return (items + size - 1) / size; }
+
+// Boxes in geometry space: they fit flat and long meshlets far better than their spheres.
+struct MeshletBounds {
+  vec4 low, high;
+};
+
+// In the order of the meshlets on the device: geometry by geometry.
+std::vector<MeshletBounds> meshlet_bounds(const scene::Scene& scene) {
+  std::vector<MeshletBounds> out;
+  for (const scene::Geometry& g : scene.geometries) {
+    for (const scene::Meshlet& m : g.meshlets) {
+      Aabb box;
+      for (uint32_t i = 0; i < 3 * m.triangle_count; ++i) box.add(g.vertices[g.indices[3 * m.first_triangle + i]].position);
+      out.push_back({vec4(box.min, 0), vec4(box.max, 0)});
+    }
+  }
+  return out;
+}
 
 uvec2 level_0_size(uint32_t width, uint32_t height) { return {groups(width, kPyramidTile), groups(height, kPyramidTile)}; }
 
@@ -79,6 +99,9 @@ Status MeshletCulling::create_buffers() {
       make(group_counts_, uint64_t{kBuckets} * groups(meshlets, kGroupSize), gpu::Memory::device, "pvs group counts"));
   TESSERA_RETURN_IF_ERROR(make(draws_, 5 * meshlets, gpu::Memory::device, "pvs draws"));
   TESSERA_RETURN_IF_ERROR(make(counts_, sizeof(CullCounts) / sizeof(uint32_t), gpu::Memory::device, "pvs draw counts"));
+  std::vector<MeshletBounds> bounds = meshlet_bounds(scene_->scene());
+  if (bounds.empty()) bounds.emplace_back();  // a binding cannot be empty
+  TESSERA_ASSIGN_OR_RETURN(bounds_, gpu::Buffer::create_filled(*device_, std::as_bytes(std::span(bounds)), "pvs meshlet bounds"));
   TESSERA_ASSIGN_OR_RETURN(sampler_, gpu::Sampler::create(*device_, {.wrap_u = gpu::Wrap::clamp_to_edge,
                                                                      .wrap_v = gpu::Wrap::clamp_to_edge,
                                                                      .filter = gpu::Filter::nearest,
@@ -90,6 +113,7 @@ Status MeshletCulling::create_pipelines() {
   std::vector<gpu::Binding> bindings;
   for (uint32_t b = kInstanceBuckets; b <= kPyramid; ++b) bindings.push_back({b, gpu::BindingKind::storage_buffer});
   bindings.push_back({kDepth, gpu::BindingKind::sampled_image});
+  bindings.push_back({kBounds, gpu::BindingKind::storage_buffer});
   TESSERA_ASSIGN_OR_RETURN(layout_, gpu::BindLayout::create(*device_, bindings));
   TESSERA_ASSIGN_OR_RETURN(group_, gpu::BindGroup::create(*device_, layout_));
   group_.set(kInstanceBuckets, buckets_);
@@ -98,6 +122,7 @@ Status MeshletCulling::create_pipelines() {
   group_.set(kGroupCounts, group_counts_);
   group_.set(kDraws, draws_);
   group_.set(kCounts, counts_);
+  group_.set(kBounds, bounds_);
 
   const auto make = [&](gpu::ComputePipeline& pipeline, const char* name, gpu::Spirv shader, uint32_t push) -> Status {
     TESSERA_ASSIGN_OR_RETURN(pipeline,

@@ -21,8 +21,7 @@ enum class CullPhase { first, second };
 // What a phase drew, as the device writes it: pvs/shaders/visibility.glsl.
 struct CullCounts {
   std::array<uint32_t, kBuckets> draws;
-  uint32_t triangles;
-  uint32_t pad;
+  uint32_t meshlets, triangles;
 };
 static_assert(sizeof(CullCounts) == 32);
 
@@ -56,7 +55,7 @@ class MeshletCulling {
   VisibilitySettings settings_;
   uint32_t meshlets_ = 0;
   std::array<uint32_t, kBuckets> first_draw_{};
-  gpu::Buffer buckets_, was_visible_, survivors_, group_counts_, draws_, counts_, pyramid_;
+  gpu::Buffer buckets_, was_visible_, survivors_, group_counts_, draws_, counts_, pyramid_, bounds_;
   gpu::Sampler sampler_;
   gpu::BindLayout layout_;
   gpu::BindGroup group_;

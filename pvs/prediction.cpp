@@ -161,7 +161,7 @@ std::vector<View> predict_views(std::span<const TimedPose> history, TimeNs now_n
   // A pose from before `now_ns` (it travelled) is extrapolated from its own time; a clock that jumped back adds nothing.
   const DurationNs age = std::clamp<DurationNs>(now_ns - prediction.newest.time_ns, 0, kMaxGapNs);
   std::vector<View> views{view_at(client_view, prediction, 0, settings)};
-  if (2 * age > settings.step_ns) views.push_back(view_at(client_view, prediction, to_seconds(age), settings));
+  if (age > 0 && 2 * age > settings.step_ns) views.push_back(view_at(client_view, prediction, to_seconds(age), settings));
   for (const DurationNs t : steps(settings)) {
     views.push_back(view_at(client_view, prediction, to_seconds(age + t), settings));
   }

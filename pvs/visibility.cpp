@@ -161,7 +161,7 @@ void Visibility::Impl::count(size_t views) {
   for (size_t v = 0; v < views; ++v) {
     for (uint32_t p = 0; p < phases; ++p) {
       const CullCounts& c = written[kPhases * v + p];
-      for (const uint32_t draws : c.draws) stats.meshlets_drawn += draws;
+      stats.meshlets_drawn += c.meshlets;
       stats.triangles_drawn += c.triangles;
     }
   }

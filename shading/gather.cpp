@@ -22,7 +22,9 @@ enum GatherBinding : uint32_t { kBlocks, kStarts, kColors, kAtlas };
 // Pass in shading/shaders/gather.glsl.
 struct PassPush {
   vec4 eye;
-  uint32_t size[4];
+  uint32_t width, height;
+  uint32_t material;
+  uint32_t first_chunk, end_chunk;
 };
 
 uint64_t raster_from_texels(GatherPath path) {
@@ -127,22 +129,26 @@ Status Gather::Impl::upload(const GatherWork& work) {
 
 void Gather::Impl::record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, const vec4& eye,
                                   const GatherWork& work) {
-  const auto chunks = static_cast<uint32_t>(work.starts.size());
-  if (chunks == 0) return;
+  if (work.compute_batches.empty()) return;
   commands.bind(compute, {&scene.group(), &instant.group(), &lighting.group(), &group});
-  commands.push(PassPush{eye, {chunks, 0, 0, 0}});
-  const uint32_t groups_x = std::min(chunks, kMaxGroupsX);
-  commands.dispatch(groups_x, (chunks + groups_x - 1) / groups_x);
+  for (const ComputeBatch& batch : work.compute_batches) {
+    commands.push(PassPush{eye, settings.width, settings.height, batch.material, batch.first_chunk, batch.end_chunk});
+    const uint32_t chunks = batch.end_chunk - batch.first_chunk;
+    const uint32_t groups_x = std::min(chunks, kMaxGroupsX);
+    commands.dispatch(groups_x, (chunks + groups_x - 1) / groups_x);
+  }
 }
 
 void Gather::Impl::record_raster(gpu::Commands& commands, const scene::SceneInstant& instant, const vec4& eye,
                                  const GatherWork& work) {
-  if (work.batches.empty()) return;
+  if (work.raster_batches.empty()) return;
   const gpu::ColorAttachment atlas{.image = &image};
   commands.begin_rendering({.colors = {&atlas, 1}, .width = settings.width, .height = settings.height});
   commands.bind(raster, {&scene.group(), &instant.group(), &lighting.group(), &group});
-  commands.push(PassPush{eye, {settings.width, settings.height, 0, 0}});
-  for (const RasterBatch& batch : work.batches) commands.draw(6, batch.block_count, 0, batch.first_block);
+  for (const RasterBatch& batch : work.raster_batches) {
+    commands.push(PassPush{eye, settings.width, settings.height, batch.material, 0, 0});
+    commands.draw(6, batch.block_count, 0, batch.first_block);
+  }
   commands.end_rendering();
 }
 

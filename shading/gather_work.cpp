@@ -71,7 +71,11 @@ void add_compute(GatherWork& work, std::span<const Item> items, std::span<const 
   uint32_t material = ~0u;
   for (uint32_t i : order) {
     if (items[i].raster) continue;
-    if (items[i].material != material) next = (next + kChunkSamples - 1) / kChunkSamples * kChunkSamples;
+    if (items[i].material != material) {
+      next = work.starts.size() * kChunkSamples;
+      const auto chunk = static_cast<uint32_t>(work.starts.size());
+      work.compute_batches.push_back({items[i].material, chunk, chunk});
+    }
     material = items[i].material;
     BlockRecord block = items[i].record;
     block.first_sample = static_cast<uint32_t>(next);
@@ -80,6 +84,7 @@ void add_compute(GatherWork& work, std::span<const Item> items, std::span<const 
     next += samples;
     // Chunks whose first sample lies in this block.
     while (work.starts.size() * kChunkSamples < next) work.starts.push_back(index);
+    work.compute_batches.back().end_chunk = static_cast<uint32_t>(work.starts.size());
     work.blocks.push_back(block);
     work.compute_samples += samples;
     if (!(block.shape & kBlockColor)) ++work.compute_blocks;
@@ -91,9 +96,9 @@ void add_raster(GatherWork& work, std::span<const Item> items, std::span<const u
   uint32_t material = ~0u;
   for (uint32_t i : order) {
     if (!items[i].raster) continue;
-    if (items[i].material != material) work.batches.push_back({static_cast<uint32_t>(work.blocks.size()), 0});
+    if (items[i].material != material) work.raster_batches.push_back({items[i].material, static_cast<uint32_t>(work.blocks.size()), 0});
     material = items[i].material;
-    ++work.batches.back().block_count;
+    ++work.raster_batches.back().block_count;
     ++work.raster_blocks;
     work.raster_samples += item_samples(items[i].record);
     work.blocks.push_back(items[i].record);

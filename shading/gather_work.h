@@ -24,16 +24,20 @@ constexpr uint32_t kBlockTransposed = 1u << 10, kBlockMasked = 1u << 11, kBlockC
 
 constexpr uint32_t kChunkSamples = 64;  // local size of gather.comp
 
-// Blocks of one material that follow each other: one raster draw.
+// Work of one material: one draw (raster) or dispatch (compute).
 struct RasterBatch {
-  uint32_t first_block, block_count;
+  uint32_t material, first_block, block_count;
+};
+struct ComputeBatch {
+  uint32_t material, first_chunk, end_chunk;
 };
 
 struct GatherWork {
   // Compute blocks, a sentinel that no sample reaches, then raster blocks.
   std::vector<BlockRecord> blocks;
   std::vector<uint32_t> starts;  // by chunk of kChunkSamples samples of one material: its first block
-  std::vector<RasterBatch> batches;
+  std::vector<ComputeBatch> compute_batches;
+  std::vector<RasterBatch> raster_batches;
   uint64_t compute_samples = 0, raster_samples = 0;  // shaded, without padding
   uint32_t colors = 0, compute_blocks = 0, raster_blocks = 0;
 };

@@ -20,7 +20,7 @@ double distance_to_box(const dvec3& p, const dvec3& min, const dvec3& max) {
 
 }  // namespace
 
-LightGrid build_light_grid(std::span<const PlacedLight> lights, uint32_t first_index) {
+LightGrid build_light_grid(std::span<const PlacedLight> lights) {
   std::vector<Sphere> spheres;
   dvec3 min(std::numeric_limits<double>::infinity()), max(-min);
   for (const PlacedLight& l : lights) {
@@ -44,7 +44,7 @@ LightGrid build_light_grid(std::span<const PlacedLight> lights, uint32_t first_i
   const auto add_cell = [&](auto reaches) {
     const auto first = static_cast<uint32_t>(grid.lights.size());
     for (uint32_t i = 0; i < spheres.size(); ++i)
-      if (spheres[i].radius == 0 || reaches(spheres[i])) grid.lights.push_back(first_index + i);
+      if (spheres[i].radius == 0 || reaches(spheres[i])) grid.lights.push_back(i);
     grid.cells.push_back({first, static_cast<uint32_t>(grid.lights.size()) - first});
   };
   for (uint32_t z = 0; z < grid.size[2]; ++z)

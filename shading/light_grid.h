@@ -14,12 +14,12 @@ struct LightGrid {
   uint32_t size[3] = {1, 1, 1};
   // size[0] * size[1] * size[2] cells, x fastest, and one more for everything outside.
   std::vector<LightCell> cells;
-  std::vector<uint32_t> lights;  // indices, by cell
+  std::vector<uint32_t> lights;  // by cell, indices into the lights that the grid was built from
 
   uint32_t outside_cell() const { return static_cast<uint32_t>(cells.size()) - 1; }
 };
 
-// Light i of `lights` is called first_index + i. Lights without a range are in every cell.
-LightGrid build_light_grid(std::span<const PlacedLight> lights, uint32_t first_index);
+// Lights without a range are in every cell.
+LightGrid build_light_grid(std::span<const PlacedLight> lights);
 
 }  // namespace tessera::shading

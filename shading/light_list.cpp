@@ -26,10 +26,11 @@ LightPlan plan_lights(const scene::Scene& scene, bool sun_shadow, uint32_t max_s
   std::stable_sort(suns.begin(), suns.end(), stronger);
   std::stable_sort(spots.begin(), spots.end(), stronger);
 
+  suns.resize(std::min<size_t>(suns.size(), kMaxDirectional));
   LightPlan plan;
   plan.directional = static_cast<uint32_t>(suns.size());
   plan.sun_shadows = sun_shadow && !suns.empty() ? 1 : 0;
-  plan.spot_shadows = std::min(static_cast<uint32_t>(spots.size()), max_spot_shadows);
+  plan.spot_shadows = std::min({static_cast<uint32_t>(spots.size()), max_spot_shadows, kMaxSpotShadows});
   for (const auto* type : {&suns, &spots, &points}) plan.order.insert(plan.order.end(), type->begin(), type->end());
   return plan;
 }

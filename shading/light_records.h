@@ -1,4 +1,4 @@
-// The records of shading/shaders/lighting.glsl as C++ (std430). Keep the two files alike.
+// The records of shading/shaders/lighting.glsl as C++ (std140, std430). Keep the two files alike.
 #pragma once
 
 #include <cstdint>
@@ -17,17 +17,6 @@ struct LightRecord {
 };
 static_assert(sizeof(LightRecord) == 48);
 
-struct LightingHeader {
-  vec3 ambient_sky;
-  float exposure;
-  vec4 ambient_ground;
-  vec4 grid_min;
-  vec4 grid_scale;
-  uint32_t grid_size[3];
-  uint32_t outside_cell;
-};
-static_assert(sizeof(LightingHeader) == 80);
-
 struct ShadowRecord {
   mat4 clip_from_relative;
   vec2 rectangle_offset, rectangle_size;
@@ -36,6 +25,22 @@ struct ShadowRecord {
   vec2 texel_size;  // of the image, in [0, 1]
 };
 static_assert(sizeof(ShadowRecord) == 96);
+
+// Directional lights and shadowed spots together.
+constexpr uint32_t kMaxLeadingLights = 16;
+
+struct LightingRecord {
+  vec3 ambient_sky;
+  float exposure;
+  vec4 ambient_ground;
+  vec4 grid_min;
+  vec4 grid_scale;
+  uint32_t grid_size[3];
+  uint32_t outside_cell;
+  LightRecord leading_lights[kMaxLeadingLights];
+  ShadowRecord shadows[kMaxLeadingLights];
+};
+static_assert(sizeof(LightingRecord) == 80 + kMaxLeadingLights * (48 + 96));
 
 struct LightCell {
   uint32_t first, count;

@@ -1,5 +1,6 @@
 #include "shading/lighting.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "shading/features.h"
@@ -10,10 +11,10 @@
 namespace tessera::shading {
 namespace {
 
-enum LightingBinding : uint32_t { kLights, kShadows, kSunMap, kSpotMaps, kCells, kCellLights };
+enum LightingBinding : uint32_t { kLeading, kGridLights, kSunMap, kSpotMaps, kCells, kCellLights };
 
-constexpr gpu::Binding kBindings[] = {{kLights, gpu::BindingKind::storage_buffer},
-                                      {kShadows, gpu::BindingKind::storage_buffer},
+constexpr gpu::Binding kBindings[] = {{kLeading, gpu::BindingKind::uniform_buffer},
+                                      {kGridLights, gpu::BindingKind::storage_buffer},
                                       {kSunMap, gpu::BindingKind::sampled_image},
                                       {kSpotMaps, gpu::BindingKind::sampled_image},
                                       {kCells, gpu::BindingKind::storage_buffer},
@@ -30,7 +31,7 @@ struct Lighting::Impl {
   gpu::BindLayout layout;
   gpu::BindGroup group;
   gpu::Sampler sampler;
-  gpu::Buffer lights, shadows, cells, cell_lights;
+  gpu::Buffer leading, grid_lights, cells, cell_lights;
   std::vector<PlacedLight> placed;
   LightGrid grid;
   std::optional<TimeNs> drawn_at;
@@ -38,7 +39,7 @@ struct Lighting::Impl {
   Status create();
   bool out_of_date(TimeNs time_ns) const;
   Status refresh(const scene::SceneInstant& instant);
-  Status write_buffers(const dvec3& origin);
+  void write_buffers(const dvec3& origin);
   Status bind_grown(uint32_t binding, gpu::Buffer& buffer, uint64_t bytes);
 };
 
@@ -55,9 +56,8 @@ Status Lighting::Impl::create() {
                                                                   .mip = gpu::Filter::nearest}));
   group.set(kSunMap, maps->sun_map(), sampler);
   group.set(kSpotMaps, maps->spot_maps(), sampler);
-  TESSERA_RETURN_IF_ERROR(
-      bind_grown(kLights, lights, sizeof(LightingHeader) + sizeof(LightRecord) * plan.order.size()));
-  TESSERA_RETURN_IF_ERROR(bind_grown(kShadows, shadows, sizeof(ShadowRecord) * maps->count()));
+  TESSERA_RETURN_IF_ERROR(bind_grown(kLeading, leading, sizeof(LightingRecord)));
+  TESSERA_RETURN_IF_ERROR(bind_grown(kGridLights, grid_lights, sizeof(LightRecord) * plan.grid_lights()));
   TESSERA_RETURN_IF_ERROR(bind_grown(kCells, cells, sizeof(LightCell)));
   return bind_grown(kCellLights, cell_lights, sizeof(uint32_t));
 }
@@ -77,7 +77,7 @@ bool Lighting::Impl::out_of_date(TimeNs time_ns) const {
 Status Lighting::Impl::refresh(const scene::SceneInstant& instant) {
   placed = place_lights(scene.scene(), plan, scene.scene().node_transforms(instant.time_ns()));
   if (plan.grid_lights() > 0) {
-    grid = build_light_grid(std::span(placed).subspan(plan.first_grid_light()), plan.first_grid_light());
+    grid = build_light_grid(std::span(placed).subspan(plan.first_grid_light()));
     TESSERA_RETURN_IF_ERROR(bind_grown(kCells, cells, grid.cells.size() * sizeof(LightCell)));
     TESSERA_RETURN_IF_ERROR(bind_grown(kCellLights, cell_lights, grid.lights.size() * sizeof(uint32_t)));
     write<LightCell>(cells, grid.cells);
@@ -89,21 +89,22 @@ Status Lighting::Impl::refresh(const scene::SceneInstant& instant) {
 }
 
 // What depends on the origin.
-Status Lighting::Impl::write_buffers(const dvec3& origin) {
-  LightingHeader header{};
-  header.ambient_sky = settings.ambient_sky;
-  header.exposure = settings.exposure;
-  header.ambient_ground = vec4(settings.ambient_ground, 0);
-  header.grid_min = vec4(vec3(grid.min - origin), 0);
-  header.grid_scale = vec4(grid.cells_per_m, 0);
-  std::copy(std::begin(grid.size), std::end(grid.size), header.grid_size);
-  header.outside_cell = grid.cells.empty() ? 0 : grid.outside_cell();
-  write<LightingHeader>(lights, {&header, 1});
+void Lighting::Impl::write_buffers(const dvec3& origin) {
+  LightingRecord record{};
+  record.ambient_sky = settings.ambient_sky;
+  record.exposure = settings.exposure;
+  record.ambient_ground = vec4(settings.ambient_ground, 0);
+  record.grid_min = vec4(vec3(grid.min - origin), 0);
+  record.grid_scale = vec4(grid.cells_per_m, 0);
+  std::copy(std::begin(grid.size), std::end(grid.size), record.grid_size);
+  record.outside_cell = grid.cells.empty() ? 0 : grid.outside_cell();
   std::vector<LightRecord> records;
   for (const PlacedLight& light : placed) records.push_back(light_record(light, origin));
-  write<LightRecord>(lights, records, sizeof(header));
-  write<ShadowRecord>(shadows, maps->records(origin));
-  return absl::OkStatus();
+  const auto first_grid_light = records.begin() + plan.first_grid_light();
+  std::copy(records.begin(), first_grid_light, record.leading_lights);
+  std::ranges::copy(maps->records(origin), record.shadows);
+  write<LightingRecord>(leading, {&record, 1});
+  write<LightRecord>(grid_lights, std::span(first_grid_light, records.end()));
 }
 
 Lighting::Lighting(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -118,7 +119,8 @@ StatusOr<std::unique_ptr<Lighting>> Lighting::create(gpu::Device& device, const 
 
 Status Lighting::update(const scene::SceneInstant& instant) {
   if (impl_->out_of_date(instant.time_ns())) TESSERA_RETURN_IF_ERROR(impl_->refresh(instant));
-  return impl_->write_buffers(instant.origin());
+  impl_->write_buffers(instant.origin());
+  return absl::OkStatus();
 }
 
 const gpu::BindLayout& Lighting::layout() const { return impl_->layout; }

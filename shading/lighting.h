@@ -12,7 +12,7 @@ namespace tessera::shading {
 struct LightingSettings {
   uint32_t sun_shadow_side = 4096;   // texels
   uint32_t spot_shadow_side = 1024;
-  uint32_t max_spot_shadows = 4;     // the strongest spots; others shine unshadowed
+  uint32_t max_spot_shadows = 4;     // the strongest spots (at most 8); others shine unshadowed
   vec3 ambient_sky{0.30f, 0.33f, 0.38f};     // hemisphere ambient radiance from above …
   vec3 ambient_ground{0.18f, 0.16f, 0.14f};  // … and below
   float exposure = 1.0f;

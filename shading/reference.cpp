@@ -27,7 +27,7 @@ struct ViewRecord {
 };
 
 struct DrawPush {
-  uint32_t first_triangle;
+  uint32_t first_triangle, instance, material;
 };
 
 ViewRecord view_record(const View& view, const dvec3& origin) {
@@ -95,7 +95,7 @@ struct ReferenceRenderer::Impl {
 };
 
 Status ReferenceRenderer::Impl::create() {
-  const gpu::Binding binding{0, gpu::BindingKind::storage_buffer};
+  const gpu::Binding binding{0, gpu::BindingKind::uniform_buffer};
   TESSERA_ASSIGN_OR_RETURN(view_layout, gpu::BindLayout::create(device, {&binding, 1}));
   TESSERA_ASSIGN_OR_RETURN(view_group, gpu::BindGroup::create(device, view_layout));
   TESSERA_ASSIGN_OR_RETURN(view_buffer,
@@ -187,7 +187,9 @@ void ReferenceRenderer::Impl::draw(gpu::Commands& commands, const scene::SceneIn
     if (ranges.empty()) return;
     commands.bind(pipeline, {&scene.group(), &instant.group(), &lighting.group(), &view_group});
     commands.bind_indices(scene.indices());
-    record_draws(commands, ranges, [&](const DrawRange& r) { commands.push(DrawPush{r.first_triangle}); });
+    record_draws(commands, ranges, [&](const DrawRange& r) {
+      commands.push(DrawPush{r.first_triangle, r.instance, scene.scene().instances[r.instance].material});
+    });
   };
   draw_ranges(pipelines.opaque, list.opaque);
   draw_ranges(pipelines.masked, list.masked);

@@ -13,31 +13,32 @@ namespace {
 class Extent {
  public:
   void add(double center, double radius, uint32_t weight) {
-    centers_.push_back({center, weight});
+    lows_.push_back({center - radius, weight});
+    highs_.push_back({center + radius, weight});
     min_ = std::min(min_, center - radius);
     max_ = std::max(max_, center + radius);
     total_ += weight;
   }
+  bool empty() const { return lows_.empty(); }
   std::pair<double, double> all() const { return {min_, max_}; }
 
-  // Everything if that is at most twice the central 98 %, else these and a margin.
+  // Everything if that is at most twice what holds the central 98 %, else that.
   std::pair<double, double> main() {
-    std::sort(centers_.begin(), centers_.end());
-    const double low = quantile(0.01), high = quantile(0.99);
-    const double margin = 0.05 * (high - low);
-    if (max_ - min_ <= 2 * (high - low)) return all();
-    return {std::max(min_, low - margin), std::min(max_, high + margin)};
+    const double low = quantile(lows_, 0.01), high = quantile(highs_, 0.99);
+    return max_ - min_ <= 2 * (high - low) ? all() : std::pair(low, high);
   }
 
  private:
-  double quantile(double share) const {
+  using Weighted = std::pair<double, uint32_t>;
+  double quantile(std::vector<Weighted>& values, double share) const {
+    std::sort(values.begin(), values.end());
     uint64_t sum = 0;
-    for (const auto& [center, weight] : centers_)
-      if (sum += weight; static_cast<double>(sum) >= share * static_cast<double>(total_)) return center;
-    return centers_.back().first;
+    for (const auto& [value, weight] : values)
+      if (sum += weight; static_cast<double>(sum) >= share * static_cast<double>(total_)) return value;
+    return values.back().first;
   }
 
-  std::vector<std::pair<double, uint32_t>> centers_;
+  std::vector<Weighted> lows_, highs_;
   double min_ = std::numeric_limits<double>::infinity(), max_ = -min_;
   uint64_t total_ = 0;
 };
@@ -62,7 +63,7 @@ ShadowFit fit_sun(const scene::Scene& scene, const std::vector<dmat4>& transform
       const dvec3 p = axes * s.center;
       for (int a = 0; a < 3; ++a) extents[a].add(p[a], s.radius, m.triangle_count);
     }
-  if (extents[0].all().first > extents[0].all().second) return {};
+  if (extents[0].empty()) return {};
   const auto [x0, x1] = extents[0].main();
   const auto [y0, y1] = extents[1].main();
   const auto [z0, z1] = extents[2].all();

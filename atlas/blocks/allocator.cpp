@@ -8,9 +8,13 @@ namespace tessera::atlas::blocks {
 namespace {
 
 // Levels with log_h <= log_w, counted row by row.
-size_t level_index(Level level) { return size_t{level.log_w} * (level.log_w + 1u) / 2 + level.log_h; }
+size_t level_index(Level level) {
+  return size_t{level.log_w} * (level.log_w + 1u) / 2 + level.log_h;
+}
 
-int32_t ceil_divide(int32_t value, int32_t by) { return (value + by - 1) / by; }
+int32_t ceil_divide(int32_t value, int32_t by) {
+  return (value + by - 1) / by;
+}
 
 }  // namespace
 
@@ -72,7 +76,8 @@ void Allocator::draw_superblocks(uint8_t log_w) {
     lines += std::max(0, level.requested - static_cast<int32_t>(level.stack.size())) * (1 << log_h);
   }
   column.superblocks.erase(column.superblocks.begin(), column.superblocks.end() - 1);
-  for (int32_t i = ceil_divide(lines, blocks_per_superblock({log_w, 0})); i > 0 && !free_superblocks_.empty(); --i) {
+  for (int32_t i = ceil_divide(lines, blocks_per_superblock({log_w, 0})); i > 0 && !free_superblocks_.empty();
+       --i) {
     column.superblocks.push_back(free_superblocks_.back());
     in_use_[free_superblocks_.back()] = 1;
     free_superblocks_.pop_back();
@@ -100,8 +105,8 @@ void Allocator::provision(uint8_t log_w) {
     offset *= 2;
     available *= 2;
   }
-  // What is left beside the last square goes to the stacks, so that the next frame starts with a square. The printed loop
-  // leaves out the last halving.
+  // What is left beside the last square goes to the stacks, so that the next frame starts with a square. The
+  // printed loop leaves out the last halving.
   for (uint8_t log_h = kMinLog; log_h < log_w; ++log_h) {
     if (offset % 2 == 1) {
       const int32_t index = offset % blocks_per_superblock({log_w, log_h});
@@ -134,7 +139,9 @@ void Allocator::assign(std::span<const Request> requests, std::span<BlockAddress
 }
 
 uint32_t Allocator::recycle() {
-  const auto is_empty = [this](uint32_t superblock) { return in_use_[superblock] && used_texels_[superblock] == 0; };
+  const auto is_empty = [this](uint32_t superblock) {
+    return in_use_[superblock] && used_texels_[superblock] == 0;
+  };
   const size_t free_before = free_superblocks_.size();
   for (uint32_t i = 0; i < in_use_.size(); ++i) {
     if (is_empty(i)) free_superblocks_.push_back(i);

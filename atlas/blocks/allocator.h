@@ -1,7 +1,7 @@
-// The three-phase block allocator (thesis 3.4, algorithms 1-3, with the corrections of docs/method.md): superblocks of
-// columns of blocks. Request frees and counts, provisioning draws superblocks a column width, assignment hands out
-// blocks. In each phase blocks are either freed or allocated, never both, so that a GPU version can run it lock-free with
-// the same arrays; this one runs on one CPU thread.
+// The three-phase block allocator (thesis 3.4, algorithms 1-3, with the corrections of docs/method.md):
+// superblocks of columns of blocks. Request frees and counts, provisioning draws superblocks a column width,
+// assignment hands out blocks. In each phase blocks are either freed or allocated, never both, so that a GPU
+// version can run it lock-free with the same arrays; this one runs on one CPU thread.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ struct BlockAddress {
   bool operator==(const BlockAddress&) const = default;
 };
 
-// One patch's change of memory in a frame. Frees happen before any allocation. Of one level, earlier requests are served
-// first.
+// One patch's change of memory in a frame. Frees happen before any allocation. Of one level, earlier requests
+// are served first.
 struct Request {
   bool frees = false;
   Level old_level;
@@ -42,11 +42,12 @@ class Allocator {
   // `superblock_log`: log2 of a superblock's side, 1..8. `superblocks`: how many there are.
   Allocator(uint8_t superblock_log, uint32_t superblocks);
 
-  // Runs the three phases. out[i] = the block of requests[i], or nullopt-like kNoBlock if it does not allocate or memory
-  // ran out. Equal inputs give equal outputs.
+  // Runs the three phases. out[i] = the block of requests[i], or nullopt-like kNoBlock if it does not
+  // allocate or memory ran out. Equal inputs give equal outputs.
   void update(std::span<const Request> requests, std::span<BlockAddress> out);
-  // Returns every superblock that holds no assigned block to the free ones, for blocks of any level; gives their number.
-  // Call it between updates: after one that only frees, it is what makes a staged atlas reset possible.
+  // Returns every superblock that holds no assigned block to the free ones, for blocks of any level; gives
+  // their number. Call it between updates: after one that only frees, it is what makes a staged atlas reset
+  // possible.
   uint32_t recycle();
   // Frees everything (atlas reset).
   void reset();
@@ -63,8 +64,8 @@ class Allocator {
   static constexpr BlockAddress kNoBlock{0xffffffffu, 0xffffffffu};
 
  private:
-  // The superblocks that a column width allocates from in this frame (`sb` in algorithm 2). The first is carried over
-  // from the frame before, with `carry_offset` square blocks of it already taken.
+  // The superblocks that a column width allocates from in this frame (`sb` in algorithm 2). The first is
+  // carried over from the frame before, with `carry_offset` square blocks of it already taken.
   struct Column {
     std::vector<uint32_t> superblocks;
     int32_t carry_offset = 0;
@@ -73,10 +74,13 @@ class Allocator {
   struct LevelState {
     std::vector<BlockAddress> stack;  // free blocks
     int32_t requested = 0;
-    int32_t slot_offset = 0, slot_count = 0;  // requests below slot_count are served from the column's superblocks
+    int32_t slot_offset = 0,
+            slot_count = 0;  // requests below slot_count are served from the column's superblocks
   };
 
-  int32_t blocks_per_superblock(Level level) const { return 1 << (2 * superblock_log_ - level.log_w - level.log_h); }
+  int32_t blocks_per_superblock(Level level) const {
+    return 1 << (2 * superblock_log_ - level.log_w - level.log_h);
+  }
   LevelState& at(Level level);
   static uint32_t texel_count(Level level) { return 1u << (level.log_w + level.log_h); }
   // visit(texels of a block, its stack)

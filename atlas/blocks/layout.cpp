@@ -9,13 +9,13 @@
 namespace tessera::atlas::blocks {
 namespace {
 
-constexpr uint32_t kMaxSide = 8192;      // texels
-constexpr uint64_t kStages = 8;          // a stage moves at most this part of the atlas
-constexpr int kPauseFrames = 15;         // between two resets; longer while resets do not help
+constexpr uint32_t kMaxSide = 8192;  // texels
+constexpr uint64_t kStages = 8;      // a stage moves at most this part of the atlas
+constexpr int kPauseFrames = 15;     // between two resets; longer while resets do not help
 constexpr int kLongestPauseFrames = 240;
-constexpr float kRelief = 0.9f;          // of the high-water mark: a reset may end early below it
-constexpr float kBiasSlack = 0.25f;      // the bias may be this much larger than needed
-constexpr float kBiasStep = 1.0f / 16;   // and falls this much a frame beyond
+constexpr float kRelief = 0.9f;         // of the high-water mark: a reset may end early below it
+constexpr float kBiasSlack = 0.25f;     // the bias may be this much larger than needed
+constexpr float kBiasStep = 1.0f / 16;  // and falls this much a frame beyond
 
 Status check(const LayoutSettings& s) {
   if (s.superblock_log < kMinLog || s.superblock_log > 8) {
@@ -26,10 +26,11 @@ Status check(const LayoutSettings& s) {
   const auto fits = [&](uint32_t size) { return size >= side && size <= kMaxSide && size % side == 0; };
   if (!fits(s.width) || !fits(s.height)) {
     return absl::InvalidArgumentError(absl::StrFormat(
-        "atlas layout: size %dx%d, both sides must be multiples of the superblock's %d texels, up to %d", s.width,
-        s.height, side, kMaxSide));
+        "atlas layout: size %dx%d, both sides must be multiples of the superblock's %d texels, up to %d",
+        s.width, s.height, side, kMaxSide));
   }
-  if (s.levels.max_log < kMinLog) return absl::InvalidArgumentError("atlas layout: levels.max_log must be at least 1");
+  if (s.levels.max_log < kMinLog)
+    return absl::InvalidArgumentError("atlas layout: levels.max_log must be at least 1");
   if (!(s.high_water > 0 && s.high_water <= 1)) {
     return absl::InvalidArgumentError("atlas layout: high_water must be a share in (0, 1]");
   }
@@ -60,7 +61,9 @@ class TraitTable {
   std::vector<uint8_t> bits_;
 };
 
-uint32_t texel_count(Level level) { return 1u << (level.log_w + level.log_h); }
+uint32_t texel_count(Level level) {
+  return 1u << (level.log_w + level.log_h);
+}
 
 // A patch's place and whether it went without one for want of memory.
 struct Places {
@@ -111,7 +114,8 @@ struct Layout::Impl {
   void place(Placement& placement, const BlockAddress& block) const;
   void free_block(const Placement& placement);
   bool must_move(const Placement& placement) const {
-    return reset.active() && placement.kind == PlacementKind::block && reset.empties(address(placement).superblock);
+    return reset.active() && placement.kind == PlacementKind::block &&
+           reset.empties(address(placement).superblock);
   }
 
   LayoutSettings settings;
@@ -123,7 +127,7 @@ struct Layout::Impl {
   LayoutStats stats;
 
   bool has_bias = false;
-  bool memory_short = false;  // after the last frame
+  bool memory_short = false;  // after the last frame: blocks may not grow
   int pause_frames = kPauseFrames, frames_since_reset = kPauseFrames;
 
   Places now, before;
@@ -209,17 +213,20 @@ void Layout::Impl::choose_levels(const scene::VisiblePatches& visible) {
 // `old`: index in `before`, or its size for a patch that was not visible.
 void Layout::Impl::choose_level(scene::PatchId patch, const BlockNeed& need, size_t old) {
   const bool known = old < before.placements.size();
-  const Placement was = known ? before.placements[old] : Placement{};
+  static constexpr Placement kAbsent;
+  const Placement& was = known ? before.placements[old] : kAbsent;
   const bool had_block = known && was.kind == PlacementKind::block;
   const bool moves = had_block && must_move(was);
   // A patch that is placed anew anyway takes the level that fits it best.
   const bool anchored = known && !moves && !before.starved[old];
   const LevelWish previous{was.kind == PlacementKind::color, was.level, was.transposed};
   const bool masked = traits[patch].masked;
-  const LevelWish wish = select_level(need, masked, stats.bias, anchored ? &previous : nullptr, settings.levels);
+  const LevelWish wish =
+      select_level(need, masked, stats.bias, anchored ? &previous : nullptr, settings.levels);
 
-  Placement placement{.patch = patch, .masked = masked};
   const auto index = static_cast<uint32_t>(now.placements.size());
+  Placement& placement = now.placements.emplace_back(Placement{.patch = patch, .masked = masked});
+  now.starved.push_back(0);
   const bool waits = had_block && !moves && memory_short && !wish.single_color &&
                      texel_count(wish.level) > texel_count(was.level);
   if (waits) {
@@ -238,8 +245,6 @@ void Layout::Impl::choose_level(scene::PatchId patch, const BlockNeed& need, siz
       (had_block ? moving : entering).push_back(index);
     }
   }
-  now.placements.push_back(placement);
-  now.starved.push_back(0);
 }
 
 void Layout::Impl::allocate() {
@@ -282,11 +287,15 @@ void Layout::Impl::count(const LayoutDelta& delta) {
 // Starts and ends resets, and calibrates the target (thesis 3.5).
 void Layout::Impl::plan_next_frame() {
   const AllocatorStats memory = allocator.stats();
-  const float share_in_use = 1 - static_cast<float>(memory.free_superblocks) / static_cast<float>(superblocks);
+  const float share_in_use =
+      1 - static_cast<float>(memory.free_superblocks) / static_cast<float>(superblocks);
   const bool starved = stats.colors_out_of_memory > 0;
   const bool above_mark = share_in_use > settings.high_water;
   const bool fragmented = memory.stack_texels >= memory.capacity_texels / superblocks;
-  memory_short = starved || above_mark;
+  const uint64_t spare_texels =
+      memory.carry_texels + memory.free_superblocks * (memory.capacity_texels / superblocks);
+  memory_short = starved || static_cast<float>(spare_texels) <
+                                (1 - settings.high_water) * static_cast<float>(memory.capacity_texels);
   ++frames_since_reset;
   if (reset.active()) {
     if (!starved && share_in_use < kRelief * settings.high_water) reset.stop();
@@ -309,9 +318,17 @@ StatusOr<std::unique_ptr<Layout>> Layout::create(const scene::Scene& scene, cons
 
 Layout::Layout(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Layout::~Layout() = default;
-LayoutDelta Layout::update(const scene::VisiblePatches& visible) { return impl_->update(visible); }
-std::span<const Placement> Layout::placements() const { return impl_->now.placements; }
-const LayoutStats& Layout::stats() const { return impl_->stats; }
-const LayoutSettings& Layout::settings() const { return impl_->settings; }
+LayoutDelta Layout::update(const scene::VisiblePatches& visible) {
+  return impl_->update(visible);
+}
+std::span<const Placement> Layout::placements() const {
+  return impl_->now.placements;
+}
+const LayoutStats& Layout::stats() const {
+  return impl_->stats;
+}
+const LayoutSettings& Layout::settings() const {
+  return impl_->settings;
+}
 
 }  // namespace tessera::atlas::blocks

@@ -14,7 +14,7 @@ namespace tessera::atlas::blocks {
 struct LayoutSettings {
   uint32_t width = 2048, height = 1024;  // texels, multiples of the superblock's side, at most 8192
   uint8_t superblock_log = 8;
-  float high_water = 0.96f;   // share of superblocks in use above which the atlas is reset
+  float high_water = 0.96f;  // share of superblocks in use above which the atlas is reset
   LevelSettings levels;
 };
 
@@ -22,11 +22,11 @@ struct LayoutStats {
   float bias = 0;
   double target_share = 0;
   double ideal_texels = 0;
-  uint64_t used_texels = 0;       // in blocks
-  uint64_t stack_texels = 0;      // fragmented
+  uint64_t used_texels = 0;   // in blocks
+  uint64_t stack_texels = 0;  // fragmented
   uint32_t blocks = 0, colors = 0, colors_out_of_memory = 0;
   uint32_t changed = 0, removed = 0;
-  bool reset = false;             // this frame re-placed everything, or a stage of it
+  bool reset = false;  // this frame re-placed everything, or a stage of it
   uint32_t resets_total = 0;
 };
 
@@ -37,8 +37,9 @@ class Layout {
   static StatusOr<std::unique_ptr<Layout>> create(const scene::Scene& scene, const LayoutSettings& settings);
   ~Layout();
 
-  // Places the visible set. Patches that stay visible at their level keep their block. When memory runs out a patch falls
-  // back to a single colour and the next frames re-place the atlas in stages (a share of the superblocks a frame).
+  // Places the visible set. Patches that stay visible at their level keep their block. When memory runs out a
+  // patch falls back to a single colour and the next frames re-place the atlas in stages (a share of the
+  // superblocks a frame).
   LayoutDelta update(const scene::VisiblePatches& visible);
   // All current placements, sorted by patch. Valid until the next update.
   std::span<const Placement> placements() const;

@@ -5,12 +5,13 @@
 namespace tessera::atlas::blocks {
 
 void StagedReset::start(std::span<const uint32_t> used_texels) {
-  std::transform(used_texels.begin(), used_texels.end(), due_.begin(), [](uint32_t texels) { return texels > 0; });
+  std::transform(used_texels.begin(), used_texels.end(), due_.begin(),
+                 [](uint32_t texels) { return texels > 0; });
   active_ = true;
 }
 
-void StagedReset::next_stage(std::span<const uint32_t> used_texels, std::span<const uint32_t> fragmented_texels,
-                             uint64_t budget_texels) {
+void StagedReset::next_stage(std::span<const uint32_t> used_texels,
+                             std::span<const uint32_t> fragmented_texels, uint64_t budget_texels) {
   std::vector<uint32_t> candidates;
   for (uint32_t i = 0; i < due_.size(); ++i) {
     if (due_[i] && used_texels[i] > 0) candidates.push_back(i);

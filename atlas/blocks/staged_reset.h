@@ -1,5 +1,5 @@
-// An atlas reset in stages (thesis 3.4 does it at once): a few superblocks a frame are emptied and their patches placed
-// anew, most fragmented first. Moving everything in one frame would cost a key frame of video.
+// An atlas reset in stages (thesis 3.4 does it at once): a few superblocks a frame are emptied and their
+// patches placed anew, most fragmented first. Moving everything in one frame would cost a key frame of video.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,8 @@ class StagedReset {
   void start(std::span<const uint32_t> used_texels);
   void stop() { active_ = false; }
   bool active() const { return active_; }
-  // Chooses the superblocks that this frame empties: together they hold at most `budget_texels`, or there is only one.
-  // With none left the reset is over.
+  // Chooses the superblocks that this frame empties: together they hold at most `budget_texels`, or there is
+  // only one. With none left the reset is over.
   void next_stage(std::span<const uint32_t> used_texels, std::span<const uint32_t> fragmented_texels,
                   uint64_t budget_texels);
   // Does this frame empty it?

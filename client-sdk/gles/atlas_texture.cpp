@@ -10,7 +10,8 @@ void main() {
 }
 )";
 
-// Reads: the three planes. Writes: RGB of the same texel. texelFetch, so that chroma never crosses a block's border.
+// Reads: the three planes. Writes: RGB of the same texel. texelFetch, so that chroma never crosses a block's
+// border.
 constexpr const char* kConvertFragment = R"(#version 300 es
 precision highp float;
 uniform highp sampler2D plane_y;
@@ -27,7 +28,8 @@ void main() {
 }
 )";
 
-void upload_plane(const Texture& texture, const uint8_t* data, uint32_t stride, uint32_t width, uint32_t height) {
+void upload_plane(const Texture& texture, const uint8_t* data, uint32_t stride, uint32_t width,
+                  uint32_t height) {
   glBindTexture(GL_TEXTURE_2D, texture.id());
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   glPixelStorei(GL_UNPACK_ROW_LENGTH, static_cast<GLint>(stride));
@@ -54,14 +56,15 @@ Status AtlasTexture::resize(uint32_t width, uint32_t height) {
   if (width == width_ && height == height_) return absl::OkStatus();
   GLint limit = 0;
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &limit);
-  if (width == 0 || height == 0 || width > static_cast<uint32_t>(limit) || height > static_cast<uint32_t>(limit)) {
-    return absl::InvalidArgumentError(absl::StrCat("an atlas of ", width, "x", height,
-                                                   " does not fit the display device (1 to ", limit, " a side)"));
+  if (width == 0 || height == 0 || width > static_cast<uint32_t>(limit) ||
+      height > static_cast<uint32_t>(limit)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "an atlas of ", width, "x", height, " does not fit the display device (1 to ", limit, " a side)"));
   }
   rgba_ = make_texture();
   set_sampling(rgba_, GL_LINEAR);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, static_cast<GLsizei>(width), static_cast<GLsizei>(height), 0, GL_RGBA,
-               GL_UNSIGNED_BYTE, nullptr);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, static_cast<GLsizei>(width), static_cast<GLsizei>(height), 0,
+               GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
   glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, rgba_.id(), 0);
   TESSERA_RETURN_IF_ERROR(check_errors("allocation of the atlas texture"));
@@ -76,8 +79,8 @@ void AtlasTexture::resize_planes() {
     planes_[i] = make_texture();
     set_sampling(planes_[i], GL_NEAREST);
     const GLsizei divisor = i == 0 ? 1 : 2;
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, static_cast<GLsizei>(width_) / divisor, static_cast<GLsizei>(height_) / divisor,
-                 0, GL_RED, GL_UNSIGNED_BYTE, nullptr);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, static_cast<GLsizei>(width_) / divisor,
+                 static_cast<GLsizei>(height_) / divisor, 0, GL_RED, GL_UNSIGNED_BYTE, nullptr);
   }
   plane_width_ = width_;
   plane_height_ = height_;
@@ -85,7 +88,8 @@ void AtlasTexture::resize_planes() {
 
 Status AtlasTexture::set(const YuvView& atlas) {
   if (atlas.width % 2 != 0 || atlas.height % 2 != 0) {
-    return absl::InvalidArgumentError(absl::StrCat("a 4:2:0 atlas must have even sides, not ", atlas.width, "x", atlas.height));
+    return absl::InvalidArgumentError(
+        absl::StrCat("a 4:2:0 atlas must have even sides, not ", atlas.width, "x", atlas.height));
   }
   TESSERA_RETURN_IF_ERROR(resize(atlas.width, atlas.height));
   glActiveTexture(GL_TEXTURE0);
@@ -112,8 +116,8 @@ Status AtlasTexture::set(const Image8& atlas) {
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, rgba_.id());
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, static_cast<GLsizei>(width_), static_cast<GLsizei>(height_), GL_RGBA,
-                  GL_UNSIGNED_BYTE, atlas.rgba.data());
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, static_cast<GLsizei>(width_), static_cast<GLsizei>(height_),
+                  GL_RGBA, GL_UNSIGNED_BYTE, atlas.rgba.data());
   return check_errors("upload of the atlas");
 }
 

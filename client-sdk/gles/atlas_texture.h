@@ -15,12 +15,13 @@ class AtlasTexture {
  public:
   static StatusOr<AtlasTexture> create();
 
-  // BT.709 limited range to RGB by a full-screen pass; each chroma sample serves its 2x2 texels and no others.
+  // BT.709 limited range to RGB by a full-screen pass; each chroma sample serves its 2x2 texels and no
+  // others.
   Status set(const YuvView& atlas);
   Status set(const Image8& atlas);
 
   void bind(GLuint unit) const { bind_texture(unit, rgba_); }
-  uint32_t width() const { return width_; }    // 0 before the first set()
+  uint32_t width() const { return width_; }  // 0 before the first set()
   uint32_t height() const { return height_; }
 
  private:

@@ -1,5 +1,5 @@
-// An OpenGL ES 3.0 context without a window: surfaceless, on a device, or on the default display with a tiny pbuffer,
-// whichever the machine has first.
+// An OpenGL ES 3.0 context without a window: surfaceless, on a device, or on the default display with a tiny
+// pbuffer, whichever the machine has first.
 #pragma once
 
 #include <EGL/egl.h>

@@ -19,16 +19,24 @@ StatusOr<Shader> compile(GLenum stage, const char* source) {
   if (ok == GL_TRUE) return shader;
   char log[2048] = {};
   glGetShaderInfoLog(shader.id(), sizeof(log) - 1, nullptr, log);
-  return absl::InternalError(absl::StrCat("glCompileShader of a ", stage == GL_VERTEX_SHADER ? "vertex" : "fragment",
-                                          " shader failed: ", log));
+  return absl::InternalError(absl::StrCat(
+      "glCompileShader of a ", stage == GL_VERTEX_SHADER ? "vertex" : "fragment", " shader failed: ", log));
 }
 
 }  // namespace
 
-Texture make_texture() { return generate<Texture, glGenTextures>(); }
-Renderbuffer make_renderbuffer() { return generate<Renderbuffer, glGenRenderbuffers>(); }
-Framebuffer make_framebuffer() { return generate<Framebuffer, glGenFramebuffers>(); }
-VertexArray make_vertex_array() { return generate<VertexArray, glGenVertexArrays>(); }
+Texture make_texture() {
+  return generate<Texture, glGenTextures>();
+}
+Renderbuffer make_renderbuffer() {
+  return generate<Renderbuffer, glGenRenderbuffers>();
+}
+Framebuffer make_framebuffer() {
+  return generate<Framebuffer, glGenFramebuffers>();
+}
+VertexArray make_vertex_array() {
+  return generate<VertexArray, glGenVertexArrays>();
+}
 
 StatusOr<Program> make_program(const char* vertex_source, const char* fragment_source) {
   TESSERA_ASSIGN_OR_RETURN(const Shader vertex, compile(GL_VERTEX_SHADER, vertex_source));
@@ -68,7 +76,8 @@ Status check_errors(const char* what) {
   if (error == GL_NO_ERROR) return absl::OkStatus();
   while (glGetError() != GL_NO_ERROR) {
   }
-  if (error == GL_OUT_OF_MEMORY) return absl::ResourceExhaustedError(absl::StrCat(what, ": out of device memory"));
+  if (error == GL_OUT_OF_MEMORY)
+    return absl::ResourceExhaustedError(absl::StrCat(what, ": out of device memory"));
   return absl::InternalError(absl::StrFormat("%s: OpenGL ES error 0x%04x", what, error));
 }
 

@@ -1,4 +1,5 @@
-// OpenGL ES objects that delete themselves, and errors as statuses. A context must be current wherever these are used.
+// OpenGL ES objects that delete themselves, and errors as statuses. A context must be current wherever these
+// are used.
 #pragma once
 
 #include <GLES3/gl3.h>
@@ -30,12 +31,24 @@ class Handle {
   GLuint id_ = 0;
 };
 
-inline void delete_texture(GLuint id) { glDeleteTextures(1, &id); }
-inline void delete_renderbuffer(GLuint id) { glDeleteRenderbuffers(1, &id); }
-inline void delete_framebuffer(GLuint id) { glDeleteFramebuffers(1, &id); }
-inline void delete_vertex_array(GLuint id) { glDeleteVertexArrays(1, &id); }
-inline void delete_shader(GLuint id) { glDeleteShader(id); }
-inline void delete_program(GLuint id) { glDeleteProgram(id); }
+inline void delete_texture(GLuint id) {
+  glDeleteTextures(1, &id);
+}
+inline void delete_renderbuffer(GLuint id) {
+  glDeleteRenderbuffers(1, &id);
+}
+inline void delete_framebuffer(GLuint id) {
+  glDeleteFramebuffers(1, &id);
+}
+inline void delete_vertex_array(GLuint id) {
+  glDeleteVertexArrays(1, &id);
+}
+inline void delete_shader(GLuint id) {
+  glDeleteShader(id);
+}
+inline void delete_program(GLuint id) {
+  glDeleteProgram(id);
+}
 
 using Texture = Handle<delete_texture>;
 using Renderbuffer = Handle<delete_renderbuffer>;
@@ -50,7 +63,8 @@ Framebuffer make_framebuffer();
 VertexArray make_vertex_array();
 StatusOr<Program> make_program(const char* vertex_source, const char* fragment_source);
 
-// Filter GL_NEAREST or GL_LINEAR, no mip levels, clamped to the edge; the texture stays bound to GL_TEXTURE_2D.
+// Filter GL_NEAREST or GL_LINEAR, no mip levels, clamped to the edge; the texture stays bound to
+// GL_TEXTURE_2D.
 void set_sampling(const Texture& texture, GLint filter);
 void bind_texture(GLuint unit, const Texture& texture);
 void set_sampler(const Program& program, const char* name, GLint unit);

@@ -19,12 +19,12 @@ Status check_limits(uint32_t width, uint32_t height, uint32_t samples) {
   glGetInternalformativ(GL_RENDERBUFFER, GL_DEPTH_COMPONENT32F, GL_SAMPLES, 1, &max_depth_samples);
   const int max_samples = std::max(1, std::min(max_color_samples, max_depth_samples));
   if (width == 0 || height == 0 || std::max(width, height) > static_cast<uint32_t>(max_side)) {
-    return absl::InvalidArgumentError(absl::StrCat("a display of ", width, "x", height,
-                                                   " pixels is not possible here (1 to ", max_side, " a side)"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "a display of ", width, "x", height, " pixels is not possible here (1 to ", max_side, " a side)"));
   }
   if (samples == 0 || samples > static_cast<uint32_t>(max_samples)) {
-    return absl::InvalidArgumentError(absl::StrCat(samples, " samples per pixel are not possible here (1 to ",
-                                                   max_samples, ")"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(samples, " samples per pixel are not possible here (1 to ", max_samples, ")"));
   }
   return absl::OkStatus();
 }
@@ -56,7 +56,8 @@ StatusOr<OffscreenTarget> OffscreenTarget::create(uint32_t width, uint32_t heigh
 
   target.resolved_ = make_framebuffer();
   glBindFramebuffer(GL_FRAMEBUFFER, target.resolved_.id());
-  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, target.resolved_color_.id());
+  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER,
+                            target.resolved_color_.id());
   TESSERA_RETURN_IF_ERROR(check_complete("the display's resolved framebuffer"));
   TESSERA_RETURN_IF_ERROR(check_errors("creation of the display's framebuffer"));
   return target;

@@ -1,7 +1,7 @@
 #include "client-sdk/gles/scene_pass.h"
 
-#include <GLES2/gl2ext.h>
 #include <EGL/egl.h>
+#include <GLES2/gl2ext.h>
 
 #include <glm/gtc/type_ptr.hpp>
 #include <span>
@@ -100,8 +100,9 @@ Status ScenePass::draw(const View& view, const AtlasTexture& atlas) {
   glClear(GL_DEPTH_BUFFER_BIT);
   if (atlas_width_ == 0) return check_errors("clearing of the picture");
   if (atlas.width() != atlas_width_ || atlas.height() != atlas_height_) {
-    return absl::FailedPreconditionError(absl::StrCat("the atlas is ", atlas.width(), "x", atlas.height(), ", but the state is of one of ",
-        atlas_width_, "x", atlas_height_, "; give set_atlas() and set_state() the same frame"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("the atlas is ", atlas.width(), "x", atlas.height(), ", but the state is of one of ",
+                     atlas_width_, "x", atlas_height_, "; give set_atlas() and set_state() the same frame"));
   }
   TESSERA_RETURN_IF_ERROR(upload_transforms(view.pose.position));
 

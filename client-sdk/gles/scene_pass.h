@@ -43,7 +43,8 @@ class ScenePass {
   std::vector<vec4> relative_;  // what transforms_ gets
   TableTexture vertices_{{GL_RGB32F, GL_RGB, GL_FLOAT, sizeof(vec3)}};
   TableTexture transforms_{{GL_RGBA32F, GL_RGBA, GL_FLOAT, sizeof(vec4)}};
-  std::array<TableTexture, kRecordGroups> records_{record_table(), record_table(), record_table(), record_table()};
+  std::array<TableTexture, kRecordGroups> records_{record_table(), record_table(), record_table(),
+                                                   record_table()};
   std::array<GLsizei, kRecordGroups> record_counts_{};
 };
 

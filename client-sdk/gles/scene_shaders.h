@@ -3,8 +3,9 @@
 
 namespace tessera::client::gles {
 
-// Reads: a triangle record (scene_state.h), vertex positions, and three texels an object: the rows of mesh space to metres
-// relative to the eye. Writes: the corner's texel in the atlas, and what the whole triangle shares.
+// Reads: a triangle record (scene_state.h), vertex positions, and three texels an object: the rows of mesh
+// space to metres relative to the eye. Writes: the corner's texel in the atlas, and what the whole triangle
+// shares.
 constexpr const char* kSceneVertex = R"(#version 300 es
 precision highp float;
 precision highp int;

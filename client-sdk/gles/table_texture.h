@@ -24,8 +24,8 @@ class TableTexture {
 
   explicit TableTexture(const TexelFormat& format) : format_(format) {}
 
-  // The table becomes `texels`; only rows that differ from before are uploaded. ResourceExhausted beyond the device's
-  // largest texture.
+  // The table becomes `texels`; only rows that differ from before are uploaded. ResourceExhausted beyond the
+  // device's largest texture.
   Status update(std::span<const std::byte> texels);
   void bind(GLuint unit) const { bind_texture(unit, texture_); }
 

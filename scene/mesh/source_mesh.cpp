@@ -47,11 +47,15 @@ size_t drop_degenerate_triangles(SourceMesh& mesh) {
 }
 
 void set_flat_normals(SourceMesh& mesh) {
-  std::vector<Vertex> vertices(mesh.indices.size());
-  for (size_t i = 0; i < mesh.indices.size(); ++i) {
-    vertices[i] = mesh.vertices[mesh.indices[i]];
-    vertices[i].normal = unit_or(area_vector(mesh.vertices, &mesh.indices[i - i % 3]), vec3(0, 1, 0));
-    mesh.indices[i] = static_cast<uint32_t>(i);
+  std::vector<Vertex> vertices;
+  vertices.reserve(mesh.indices.size());
+  for (size_t i = 0; i < mesh.indices.size(); i += 3) {
+    const vec3 normal = unit_or(area_vector(mesh.vertices, &mesh.indices[i]), vec3(0, 1, 0));
+    for (size_t k = i; k < i + 3; ++k) {
+      vertices.push_back(mesh.vertices[mesh.indices[k]]);
+      vertices.back().normal = normal;
+      mesh.indices[k] = static_cast<uint32_t>(k);
+    }
   }
   mesh.vertices = std::move(vertices);
 }

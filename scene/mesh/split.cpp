@@ -23,12 +23,15 @@ class EdgeRule {
   }
 
   bool splits(const vec3& p, const vec3& q) const {
-    if (length2(p, q) <= max2_) return false;
-    const vec3 m = midpoint(p, q);  // at the resolution of floats there may be nothing between
-    return m != p && m != q;
+    const double whole2 = length2(p, q);
+    if (whole2 <= max2_) return false;
+    // At the resolution of floats the midpoint may fall to one end; both parts must get shorter, so that it all ends.
+    const vec3 m = midpoint(p, q);
+    return std::max(length2(p, m), length2(m, q)) < kShorter2 * whole2;
   }
 
  private:
+  static constexpr double kShorter2 = 0.75 * 0.75;
   dvec3 scale_;
   double max2_;
 };

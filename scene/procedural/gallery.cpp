@@ -240,7 +240,7 @@ class Gallery {
     add_box(body, vec3(0, 0.62f, 0.52f), vec3(0.6f, 0.52f, 0.05f), 1, d_.cell_m);
     add_sphere(load, vec3(0, 0.62f, -0.1f), 0.26f, d_.sphere, d_.sphere / 2);
     add_lathe(wheel, vec3(0, -0.03f, 0), 0.06f, d_.sides, 1, vec2(4, 0.2f), [](float) { return 0.14f; });
-    add_disc(wheel, vec3(0, 0.03f, 0), 0.14f, 6);
+    add_disc(wheel, vec3(0, 0.03f, 0), 0.14f, d_.sides);
     const uint32_t cart = build_.add_node(dvec3(3.9, 0, 8));
     constexpr float kReach = 7;
     build_.animate({cart, AnimationPath::translation, Interpolation::cubic_spline, {0, 0.5 * kLoopSeconds, kLoopSeconds},
@@ -290,7 +290,7 @@ CameraPath gallery_path() {
   constexpr double kSeconds = 30, kRate = 60, kTauD = 6.283185307179586;
   std::vector<TimedPose> poses;
   for (int i = 0; i <= kSeconds * kRate; ++i) {
-    const double t = i / kRate, phase = kTauD * t / kSeconds;
+    const double t = i / kRate, phase = 0.6 + kTauD * t / kSeconds;
     // Once around the exhibits, with a walking bob and the head turning to both sides.
     const dvec3 position(1.7 * std::sin(phase), 1.65 + 0.02 * std::sin(kTauD * 1.8 * t), 9.5 * std::cos(phase));
     const double heading = std::atan2(1.7 * std::cos(phase), -9.5 * std::sin(phase));

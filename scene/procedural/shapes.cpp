@@ -43,8 +43,9 @@ void add_pipe(SourceMesh& mesh, vec3 from, vec3 to, float radius, uint32_t sides
 
 void add_sphere(SourceMesh& mesh, vec3 center, float radius, uint32_t columns, uint32_t rows) {
   add_surface(mesh, columns, rows, vec2(4, 2), [&](float u, float v) {
-    const float polar = 0.5f * kTau * (1 - v);
-    return center + radius * vec3(std::sin(polar) * std::cos(-kTau * u), std::cos(polar), std::sin(polar) * std::sin(-kTau * u));
+    const float polar = 0.5f * kTau * (1 - v), around = -kTau * u;
+    const float ring = v == 0 || v == 1 ? 0.f : std::sin(polar);  // exactly 0, so that triangles at the poles vanish
+    return center + radius * vec3(ring * std::cos(around), std::cos(polar), ring * std::sin(around));
   });
 }
 

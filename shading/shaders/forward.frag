@@ -6,14 +6,13 @@
 
 layout(constant_id = 30) const bool kMasked = false;  // the draw's material cuts away texels
 
-layout(location = 0) flat in uint in_instance;
 layout(location = 0) out vec4 out_color;
 
 void main() {
   vec2 pixel = floor(gl_FragCoord.xy) + gl_SamplePosition;
-  Triangle t = fetch_triangle(in_instance, draw.first_triangle + uint(gl_PrimitiveID));
-  SurfacePoint p = surface_point(in_instance, t, triangle_point(t, pixel));
+  Triangle t = fetch_triangle(draw.instance, draw.first_triangle + uint(gl_PrimitiveID));
+  SurfacePoint p = surface_point(draw.instance, draw.material, t, triangle_point(t, pixel));
   vec4 base = base_color(p);
-  if (kMasked && base.a < materials[p.material].alpha_cutoff) discard;
+  if (kMasked && base.a < materials[draw.material].alpha_cutoff) discard;
   out_color = vec4(srgb_encode_color(shade(p, base.rgb, view.eye.xyz)), 1.0);
 }

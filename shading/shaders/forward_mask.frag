@@ -4,10 +4,8 @@
 #include "shading/shaders/material.glsl"
 #include "shading/shaders/view.glsl"
 
-layout(location = 0) flat in uint in_instance;
-
 void main() {
   vec2 pixel = floor(gl_FragCoord.xy) + gl_SamplePosition;
-  Triangle t = fetch_triangle(in_instance, draw.first_triangle + uint(gl_PrimitiveID));
-  if (is_cut_away(texture_point(in_instance, t, triangle_point(t, pixel)))) discard;
+  Triangle t = fetch_triangle(draw.instance, draw.first_triangle + uint(gl_PrimitiveID));
+  if (is_cut_away(texture_point(draw.material, t, triangle_point(t, pixel)))) discard;
 }

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// One invocation a sample. A workgroup (chunk) has samples of one material, so that its textures are uniform.
+// One invocation a sample, one dispatch a material, so that textures are uniform and a material's loads cheap.
 #include "shading/shaders/gather.glsl"
 
 layout(local_size_x = 64) in;
@@ -10,8 +10,8 @@ layout(set = 3, binding = 2, std430) writeonly buffer Colors { uint colors[]; };
 layout(set = 3, binding = 3, rgba8) uniform writeonly image2D atlas;
 
 void main() {
-  uint chunk = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-  if (chunk >= pass.size.x) return;
+  uint chunk = pass.first_chunk + gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+  if (chunk >= pass.end_chunk) return;
   uint s = chunk * 64u + gl_LocalInvocationID.x;
   uint b = starts[chunk];
   while (s >= blocks[b + 1u].first_sample) ++b;  // the last block is followed by one that never starts

@@ -17,7 +17,9 @@ layout(set = 3, binding = 0, std430) readonly buffer Blocks { Block blocks[]; };
 
 layout(push_constant) uniform Pass {
   vec4 eye;  // relative to the instant's origin
-  uvec4 size;  // raster: of the atlas; compute: x = chunks
+  uvec2 atlas_size;
+  uint material;  // of all blocks of this dispatch or draw
+  uint first_chunk, end_chunk;  // compute path
 } pass;
 
 uvec2 block_size(uint shape) { return uvec2(1u << (shape & 15u), 1u << ((shape >> 4) & 15u)); }
@@ -106,7 +108,7 @@ vec3 block_texel(Block block, uvec2 texel) {
   point.ddx *= footprint;
   point.ddy *= footprint;
   Triangle t = fetch_triangle(block.instance, block.first_triangle + triangle);
-  SurfacePoint p = surface_point(block.instance, t, point);
+  SurfacePoint p = surface_point(block.instance, pass.material, t, point);
   vec4 base = base_color(p);
   if (is_coverage) return vec3(srgb_decode(coverage(base.a, materials[p.material].alpha_cutoff)));
   return shade(p, base.rgb, pass.eye.xyz);

@@ -11,7 +11,7 @@ void main() {
   Block block = blocks[gl_InstanceIndex];
   uvec2 size = block_size(block.shape);
   uvec2 texel = uvec2(block.place & 0xffffu, block.place >> 16) + uvec2(corner & 1u, corner >> 1) * size;
-  vec2 unit = vec2(texel) / vec2(pass.size.xy);
+  vec2 unit = vec2(texel) / vec2(pass.atlas_size);
   out_block = uint(gl_InstanceIndex);
   gl_Position = vec4(2.0 * unit.x - 1.0, 1.0 - 2.0 * unit.y, 0.0, 1.0);
 }

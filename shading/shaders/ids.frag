@@ -6,15 +6,14 @@
 
 layout(constant_id = 30) const bool kMasked = false;
 
-layout(location = 0) flat in uint in_instance;
 layout(location = 0) out uvec2 out_id_depth;
 
 void main() {
   uint triangle = draw.first_triangle + uint(gl_PrimitiveID);
   if (kMasked) {
-    Triangle t = fetch_triangle(in_instance, triangle);
-    if (is_cut_away(texture_point(in_instance, t, triangle_point(t, gl_FragCoord.xy)))) discard;
+    Triangle t = fetch_triangle(draw.instance, triangle);
+    if (is_cut_away(texture_point(draw.material, t, triangle_point(t, gl_FragCoord.xy)))) discard;
   }
-  uint id = instances[in_instance].first_triangle + triangle - instances[in_instance].geometry_first_triangle;
+  uint id = instances[draw.instance].first_triangle + triangle - instances[draw.instance].geometry_first_triangle;
   out_id_depth = uvec2(id + 1u, floatBitsToUint(1.0 / gl_FragCoord.w));
 }

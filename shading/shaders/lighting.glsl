@@ -5,7 +5,6 @@
 #include "shading/shaders/brdf.glsl"
 #include "shading/shaders/features.glsl"
 
-// Directional lights first, then local ones (point, spot): the shadowed spots, then those of the grid.
 struct LightRecord {
   vec4 position_range;   // relative to the instant's origin; w = 1 / range, 0 = unlimited
   vec4 direction_scale;  // unit, the way the light shines; w = cone scale (0: a point light)
@@ -19,15 +18,19 @@ struct ShadowRecord {
   vec4 texel;      // x = side of a texel in metres (sun) or per metre of distance (spot); zw = in the image, in [0, 1]
 };
 
-layout(set = 2, binding = 0, std430) readonly buffer Lights {
+// Uniform buffers where every sample reads the same: on the software device such a load costs next to nothing, while one
+// from a storage buffer is repeated for each sample.
+const uint kMaxLeadingLights = 16;
+layout(set = 2, binding = 0, std140) uniform LightingRecord {
   vec4 ambient_sky;     // rgb radiance from above; a = exposure
   vec4 ambient_ground;  // rgb radiance from below
   vec4 grid_min;        // relative to the instant's origin
   vec4 grid_scale;      // cells per metre
   uvec4 grid_size;      // cells per axis; w = index of the cell for everything outside
-  LightRecord lights[];
+  LightRecord leading_lights[kMaxLeadingLights];  // directional ones, then shadowed spots
+  ShadowRecord shadows[kMaxLeadingLights];
 };
-layout(set = 2, binding = 1, std430) readonly buffer Shadows { ShadowRecord shadows[]; };
+layout(set = 2, binding = 1, std430) readonly buffer GridLights { LightRecord grid_lights[]; };
 layout(set = 2, binding = 2) uniform sampler2D sun_shadow_map;    // reversed depth: nearer to the light is greater
 layout(set = 2, binding = 3) uniform sampler2D spot_shadow_maps;  // side by side
 layout(set = 2, binding = 4, std430) readonly buffer Cells { uvec2 cells[]; };  // first, count in cell_lights[]
@@ -109,20 +112,20 @@ uvec2 grid_cell(vec3 position) {
 vec3 direct_light(Substance s, vec3 position, vec3 geometric, vec3 normal, vec3 v) {
   vec3 sum = vec3(0.0);
   for (uint i = 0; i < kDirectionalLights; ++i) {
-    vec3 l = -lights[i].direction_scale.xyz;
-    vec3 light = lights[i].color_offset.rgb * reflected(s, normal, v, l);
+    vec3 l = -leading_lights[i].direction_scale.xyz;
+    vec3 light = leading_lights[i].color_offset.rgb * reflected(s, normal, v, l);
     if (i < kSunShadows) light *= sun_visibility(position, geometric, l);
     sum += light;
   }
   for (uint i = 0; i < kSpotShadows; ++i) {
-    Incidence in_ = local_incidence(lights[kDirectionalLights + i], position, normal);
+    Incidence in_ = local_incidence(leading_lights[kDirectionalLights + i], position, normal);
     sum += in_.radiance * reflected(s, normal, v, in_.l) *
            spot_visibility(i, position, geometric, in_.l, in_.distance);
   }
   if (kGridLights > 0u) {
     uvec2 cell = grid_cell(position);
     for (uint i = 0; i < cell.y; ++i) {
-      Incidence in_ = local_incidence(lights[cell_lights[cell.x + i]], position, normal);
+      Incidence in_ = local_incidence(grid_lights[cell_lights[cell.x + i]], position, normal);
       sum += in_.radiance * reflected(s, normal, v, in_.l);
     }
   }

@@ -81,9 +81,9 @@ void set_uv1(inout SurfacePoint p, Triangle t, TrianglePoint at) {
 }
 
 // What texture lookups need, and no more: alpha tests stop here.
-SurfacePoint texture_point(uint instance, Triangle t, TrianglePoint at) {
+SurfacePoint texture_point(uint material, Triangle t, TrianglePoint at) {
   SurfacePoint p;
-  p.material = instances[instance].material;
+  p.material = material;
   p.position = t.a + at.weights.x * t.edge1 + at.weights.y * t.edge2;
   set_uv0(p, t, at);
   p.uv1 = vec2(0.0);
@@ -97,8 +97,8 @@ SurfacePoint texture_point(uint instance, Triangle t, TrianglePoint at) {
   return p;
 }
 
-SurfacePoint surface_point(uint instance, Triangle t, TrianglePoint at) {
-  SurfacePoint p = texture_point(instance, t, at);
+SurfacePoint surface_point(uint instance, uint material, Triangle t, TrianglePoint at) {
+  SurfacePoint p = texture_point(material, t, at);
   float side = is_mirrored(instance) ? -1.0 : 1.0;
   vec3 interpolated = normal_to_world(instance, interpolate_normal(t, at.weights));
   // Scaled, so that neither a crumb's nor a planet's cross product leaves the range of float.

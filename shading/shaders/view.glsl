@@ -4,7 +4,7 @@
 
 #include "shading/shaders/surface.glsl"
 
-layout(set = 3, binding = 0, std430) readonly buffer ViewRecord {
+layout(set = 3, binding = 0, std140) uniform ViewRecord {
   mat4 clip_from_relative;
   vec4 eye;  // relative to the instant's origin
   // The ray through framebuffer position (x, y), in pixels from the upper left: ray_0 + x ray_x + y ray_y, of length 1
@@ -12,7 +12,12 @@ layout(set = 3, binding = 0, std430) readonly buffer ViewRecord {
   vec4 ray_0, ray_x, ray_y;
 } view;
 
-layout(push_constant) uniform Draw { uint first_triangle; } draw;  // in the index buffer / 3
+// Instance and material come as constants, not through varyings: loads at a uniform address are many times cheaper on
+// the software device.
+layout(push_constant) uniform Draw {
+  uint first_triangle;  // in the index buffer / 3
+  uint instance, material;
+} draw;
 
 // Where the ray through `pixel` meets the triangle's plane (Möller-Trumbore), and the exact derivatives of the weights
 // over whole pixels. Clamped to the triangle: rounding at an edge-on triangle must not reach outside it.

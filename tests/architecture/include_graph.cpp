@@ -2,7 +2,6 @@
 
 #include <fstream>
 #include <iterator>
-#include <regex>
 #include <sstream>
 
 namespace tessera::architecture {
@@ -13,20 +12,32 @@ std::string read_text(const std::filesystem::path& file) {
 }
 
 std::vector<std::string> includes_of(const std::string& text) {
-  static const std::regex line("^[ \t]*#[ \t]*include[ \t]*[<\"]([^>\"]+)[>\"]", std::regex::multiline);
   std::vector<std::string> found;
-  for (std::sregex_iterator match(text.begin(), text.end(), line), end; match != end; ++match) {
-    found.push_back((*match)[1]);
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream in(line);
+    char hash = 0, open = 0;
+    std::string path;
+    // "#", "include" and the path may have blanks between them.
+    if (!(in >> hash) || hash != '#' || !(in >> std::ws)) continue;
+    std::string word(7, ' ');
+    if (!in.read(word.data(), 7) || word != "include" || !(in >> open)) continue;
+    if (open != '<' && open != '"') continue;
+    if (std::getline(in, path, open == '<' ? '>' : '"')) found.push_back(path);
   }
   return found;
 }
 
 Rules parse_rules(const std::string& rooms_cmake) {
-  static const std::regex line("^set\\(TESSERA_(ROOMS|MAY_USE_([a-z-]+))([^)]*)\\)", std::regex::multiline);
+  const std::string set = "set(TESSERA_", rooms = "ROOMS", may_use = "MAY_USE_";
   Rules rules;
   std::set<std::string> all;
-  for (std::sregex_iterator match(rooms_cmake.begin(), rooms_cmake.end(), line), end; match != end; ++match) {
-    std::istringstream words((*match)[3]);
+  std::istringstream lines(rooms_cmake);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with(set)) continue;
+    std::istringstream words(line.substr(set.size(), line.find(')') - set.size()));
+    std::string key;
+    words >> key;
     std::set<std::string> names;
     for (std::string word; words >> word;) {
       if (word == "${TESSERA_ROOMS}") {
@@ -35,17 +46,15 @@ Rules parse_rules(const std::string& rooms_cmake) {
         names.insert(word);
       }
     }
-    if ((*match)[1] == "ROOMS") {
-      all = names;
-    } else {
-      rules[(*match)[2]] = names;
-    }
+    if (key == rooms) all = names;
+    if (key.starts_with(may_use)) rules[key.substr(may_use.size())] = names;
   }
   return rules;
 }
 
 IncludeGraph read_rooms(const std::filesystem::path& source_tree, const Rules& rules) {
-  static const std::set<std::string> extensions{".h", ".cpp", ".glsl", ".comp", ".vert", ".frag", ".tesc", ".tese"};
+  static const std::set<std::string> extensions{".h",    ".cpp",  ".glsl", ".comp",
+                                                ".vert", ".frag", ".tesc", ".tese"};
   IncludeGraph graph;
   for (const auto& [room, used] : rules) {
     for (const auto& entry : std::filesystem::recursive_directory_iterator(source_tree / room)) {

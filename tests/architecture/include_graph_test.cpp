@@ -38,7 +38,8 @@ TEST_F(SourceTree, RoomsUseOnlyTheRoomsThatTheyMay) {
 TEST_F(SourceTree, OnlyGpuIncludesVulkan) {
   for (const auto& [file, includes] : graph_) {
     if (room_of(file, rules_) == "gpu") continue;
-    for (const std::string& include : includes) EXPECT_FALSE(is_vulkan(include)) << file << " includes " << include;
+    for (const std::string& include : includes)
+      EXPECT_FALSE(is_vulkan(include)) << file << " includes " << include;
   }
 }
 
@@ -62,8 +63,10 @@ TEST_F(SourceTree, GeometryCompressionUsesTheStandardLibraryAlone) {
 }
 
 TEST(IncludeGraph, FindsIncludesInAnyForm) {
-  EXPECT_THAT(includes_of("#include \"a/b.h\"\n  #  include <c>\n// #include <d>\nint x; #include <e>\n#include <f.h>"),
-              ElementsAre("a/b.h", "c", "f.h"));
+  EXPECT_THAT(
+      includes_of(
+          "#include \"a/b.h\"\n  #  include <c>\n// #include <d>\nint x; #include <e>\n#include <f.h>"),
+      ElementsAre("a/b.h", "c", "f.h"));
 }
 
 TEST(IncludeGraph, FindsForbiddenUses) {
@@ -77,8 +80,8 @@ TEST(IncludeGraph, FindsForbiddenUses) {
   EXPECT_THAT(forbidden_uses(graph, rules),
               UnorderedElementsAre("low/b.h includes mid/a.h", "mid/a.h includes ../high-top/a.h",
                                    "high-top/a.h includes low/a.h"));
-  EXPECT_THAT(reachable(graph, {"high-top/"}),
-              UnorderedElementsAre("mid/a.h", "low/a.h", "lowest/x.h", "../high-top/a.h", "cstdint", "low/b.h"));
+  EXPECT_THAT(reachable(graph, {"high-top/"}), UnorderedElementsAre("mid/a.h", "low/a.h", "lowest/x.h",
+                                                                    "../high-top/a.h", "cstdint", "low/b.h"));
 }
 
 TEST(IncludeGraph, ExpandsTheListOfAllRooms) {

@@ -19,7 +19,9 @@ struct Owner {
 class Model {
  public:
   Model(uint8_t superblock_log, uint32_t superblocks, size_t patches)
-      : superblock_log_(superblock_log), superblocks_(superblocks), allocator(superblock_log, superblocks),
+      : superblock_log_(superblock_log),
+        superblocks_(superblocks),
+        allocator(superblock_log, superblocks),
         owners(patches) {}
 
   // Sets the wish of a patch for the next step(); nullopt = leaves.
@@ -97,7 +99,8 @@ Level random_level(std::mt19937& random, uint8_t max_log) {
   const auto draw = [&] {
     std::uniform_real_distribution<float> uniform(0, 1);
     const float v = uniform(random);
-    return static_cast<uint8_t>(kMinLog + static_cast<int>(v * v * static_cast<float>(max_log - kMinLog) + 0.5f));
+    return static_cast<uint8_t>(kMinLog +
+                                static_cast<int>(v * v * static_cast<float>(max_log - kMinLog) + 0.5f));
   };
   const uint8_t a = draw(), b = draw();
   return {std::max(a, b), std::min(a, b)};
@@ -200,7 +203,8 @@ TEST(Allocator, LargestBlockTakesAWholeSuperblock) {
   }
 }
 
-// The example of thesis fig. 3.6 in its structure: one superblock is topped up over frames before another is drawn.
+// The example of thesis fig. 3.6 in its structure: one superblock is topped up over frames before another is
+// drawn.
 TEST(Allocator, CarriedSuperblockIsToppedUp) {
   Model model(6, 4, 64);
   for (size_t i = 0; i < 16; ++i) {

@@ -106,8 +106,9 @@ TEST_F(LayoutTest, RejectsSizesThatDoNotFitTheSuperblocks) {
   const scene::Scene scene = make_scene(1);
   for (const LayoutSettings& settings :
        {LayoutSettings{.width = 0}, LayoutSettings{.width = 300}, LayoutSettings{.height = 128},
-        LayoutSettings{.width = 16384}, LayoutSettings{.superblock_log = 0}, LayoutSettings{.superblock_log = 9},
-        LayoutSettings{.levels = {.max_log = 0}}, LayoutSettings{.high_water = 0}}) {
+        LayoutSettings{.width = 16384}, LayoutSettings{.superblock_log = 0},
+        LayoutSettings{.superblock_log = 9}, LayoutSettings{.levels = {.max_log = 0}},
+        LayoutSettings{.high_water = 0}}) {
     const auto layout = Layout::create(scene, settings);
     EXPECT_EQ(layout.status().code(), absl::StatusCode::kInvalidArgument);
     EXPECT_THAT(layout.status().message(), HasSubstr("atlas layout"));
@@ -180,7 +181,8 @@ TEST_F(LayoutTest, SwayingFootprintsDoNotMoveTheAtlas) {
   uint64_t changed = 0;
   for (int frame = 0; frame < 60; ++frame) {
     VisiblePatches visible;
-    for (uint32_t i = 0; i < sides.size(); ++i) visible.push_back(square(i, std::exp2(sides[i] + sway(random))));
+    for (uint32_t i = 0; i < sides.size(); ++i)
+      visible.push_back(square(i, std::exp2(sides[i] + sway(random))));
     const LayoutDelta delta = update(visible);
     if (frame > 10) changed += delta.changed.size();
   }
@@ -189,7 +191,11 @@ TEST_F(LayoutTest, SwayingFootprintsDoNotMoveTheAtlas) {
 
 TEST_F(LayoutTest, ExactlyFullAtlas) {
   // 64 blocks of 16x16 in 128x128, at the level that the smallest bias allows.
-  make(65, {.width = 128, .height = 128, .superblock_log = 4, .high_water = 1, .levels = {.min_bias = 0, .max_bias = 0}});
+  make(65, {.width = 128,
+            .height = 128,
+            .superblock_log = 4,
+            .high_water = 1,
+            .levels = {.min_bias = 0, .max_bias = 0}});
   update(squares(64, 16));
   EXPECT_EQ(layout_->stats().used_texels, 128u * 128u);
   EXPECT_EQ(layout_->stats().colors_out_of_memory, 0u);
@@ -202,6 +208,14 @@ TEST_F(LayoutTest, ExactlyFullAtlas) {
   update(visible);
   EXPECT_EQ(layout_->stats().colors_out_of_memory, 0u);
   EXPECT_EQ(placement(64).kind, PlacementKind::block);
+}
+
+// All superblocks in use is not the same as no memory.
+TEST_F(LayoutTest, BlocksGrowInAnAtlasOfOneSuperblock) {
+  make(4, {.width = 64, .height = 64, .superblock_log = 6, .levels = {.min_bias = 0}});
+  for (int frame = 0; frame < 3; ++frame) update({{0, {8, 4, 32}}});
+  update({{0, {8, 8, 64}}});
+  EXPECT_EQ(placement(0).level, (Level{3, 3}));
 }
 
 TEST_F(LayoutTest, OneFootprintOfTheLargestBlock) {
@@ -218,7 +232,11 @@ TEST_F(LayoutTest, ExtremeFootprintsAreHarmless) {
   make(4, {});
   const float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
   for (int frame = 0; frame < 5; ++frame) {
-    update({{0, {nan, nan, nan}}, {1, {inf, inf, inf}}, {2, {0, 0, 0}}, {3, {-1, 1e-40f, 1e30f}}, {5, {inf, 0, nan}}});
+    update({{0, {nan, nan, nan}},
+            {1, {inf, inf, inf}},
+            {2, {0, 0, 0}},
+            {3, {-1, 1e-40f, 1e30f}},
+            {5, {inf, 0, nan}}});
     EXPECT_EQ(placement(0).kind, PlacementKind::color);
     EXPECT_EQ(placement(1).kind, PlacementKind::block);
   }
@@ -306,7 +324,8 @@ TEST_F(CrowdedLayoutTest, EqualInputsGiveEqualLayouts) {
   }
 }
 
-// One superblock cannot serve several widths: patches fall back to colours, the atlas does not churn for ever.
+// One superblock cannot serve several widths: patches fall back to colours, the atlas does not churn for
+// ever.
 TEST_F(LayoutTest, HopelessAtlasSettles) {
   make(60, {.width = 64, .height = 64, .superblock_log = 6});
   VisiblePatches visible;

@@ -15,7 +15,9 @@ using scene::Footprint;
 constexpr PatchTraits kLone{.triangle_count = 1}, kPair{.triangle_count = 2};
 constexpr PatchTraits kMaskedPair{.triangle_count = 2, .masked = true};
 
-Footprint rectangle(float u, float v) { return {u, v, u * v}; }
+Footprint rectangle(float u, float v) {
+  return {u, v, u * v};
+}
 
 uint32_t texels(const LevelWish& wish) {
   return wish.single_color ? 0 : 1u << (wish.level.log_w + wish.level.log_h);
@@ -26,16 +28,23 @@ bool operator==(const LevelWish& a, const LevelWish& b) {
 }
 
 bool is_valid(const LevelWish& wish, const LevelSettings& settings) {
-  return wish.single_color ||
-         (kMinLog <= wish.level.log_h && wish.level.log_h <= wish.level.log_w && wish.level.log_w <= settings.max_log);
+  return wish.single_color || (kMinLog <= wish.level.log_h && wish.level.log_h <= wish.level.log_w &&
+                               wish.level.log_w <= settings.max_log);
 }
 
 std::vector<float> extreme_values() {
   const float inf = std::numeric_limits<float>::infinity();
-  std::vector<float> values{0.0f, -0.0f, -1.0f, std::numeric_limits<float>::denorm_min(),
-                            std::numeric_limits<float>::min(), std::numeric_limits<float>::max(),
-                            inf, -inf, std::numeric_limits<float>::quiet_NaN()};
-  for (int exponent = -20; exponent <= 30; ++exponent) values.push_back(std::exp2(0.7f * static_cast<float>(exponent)));
+  std::vector<float> values{0.0f,
+                            -0.0f,
+                            -1.0f,
+                            std::numeric_limits<float>::denorm_min(),
+                            std::numeric_limits<float>::min(),
+                            std::numeric_limits<float>::max(),
+                            inf,
+                            -inf,
+                            std::numeric_limits<float>::quiet_NaN()};
+  for (int exponent = -20; exponent <= 30; ++exponent)
+    values.push_back(std::exp2(0.7f * static_cast<float>(exponent)));
   return values;
 }
 
@@ -68,7 +77,8 @@ TEST(LevelSelection, NanCountsAsZero) {
   EXPECT_TRUE(select_level({nan, nan, nan}, kPair, 0, nullptr, {}).single_color);
 }
 
-// About one texel a pixel, in both axes: rounding of the area and of the aspect move a side by 0.75 octaves at most.
+// About one texel a pixel, in both axes: rounding of the area and of the aspect move a side by 0.75 octaves
+// at most.
 TEST(LevelSelection, BlocksMatchFootprintsInBothAxes) {
   for (float u = 4; u <= 150; u *= 1.07f) {
     for (float v = 4; v <= 150; v *= 1.07f) {
@@ -156,7 +166,8 @@ TEST(LevelSelection, LargestBlocksAreSuperblocks) {
 TEST(LevelSelection, BiasHalvesTheAreaPerUnit) {
   const Footprint footprint = rectangle(64, 64);
   for (int bias = -2; bias <= 10; ++bias) {
-    EXPECT_EQ(texels(select_level(footprint, kPair, static_cast<float>(bias), nullptr, {})), 1u << (12 - bias));
+    EXPECT_EQ(texels(select_level(footprint, kPair, static_cast<float>(bias), nullptr, {})),
+              1u << (12 - bias));
   }
 }
 
@@ -208,7 +219,8 @@ Population random_population(uint32_t seed, float median_area, float spread, siz
   std::normal_distribution<float> normal;
   Population population;
   for (size_t i = 0; i < count; ++i) {
-    const float area = median_area * std::exp(spread * normal(random)), ratio = std::exp(0.5f * normal(random));
+    const float area = median_area * std::exp(spread * normal(random)),
+                ratio = std::exp(0.5f * normal(random));
     population.footprints.push_back({std::sqrt(area) * ratio, std::sqrt(area) / ratio, area});
     population.ideal_areas.push_back(ideal_area(population.footprints.back(), kPair));
     population.ideal += population.ideal_areas.back();
@@ -218,7 +230,8 @@ Population random_population(uint32_t seed, float median_area, float spread, siz
 
 double texels_in_use(const Population& population, float bias, const LevelSettings& settings) {
   double sum = 0;
-  for (const Footprint& f : population.footprints) sum += texels(select_level(f, kPair, bias, nullptr, settings));
+  for (const Footprint& f : population.footprints)
+    sum += texels(select_level(f, kPair, bias, nullptr, settings));
   return sum;
 }
 

@@ -12,7 +12,8 @@ namespace tessera::atlas {
 
 class Occupancy {
  public:
-  Occupancy(uint32_t width, uint32_t height) : width_(width), height_(height), taken_(size_t{width} * height) {}
+  Occupancy(uint32_t width, uint32_t height)
+      : width_(width), height_(height), taken_(size_t{width} * height) {}
 
   // False if the rectangle leaves the atlas or covers a texel that is taken.
   [[nodiscard]] bool take(uint32_t x, uint32_t y, Level level) {

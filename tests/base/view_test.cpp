@@ -11,7 +11,9 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-float radians(double degrees) { return static_cast<float>(degrees * kPi / 180); }
+float radians(double degrees) {
+  return static_cast<float>(degrees * kPi / 180);
+}
 
 dquat random_rotation(std::mt19937& random) {
   std::normal_distribution<double> normal;
@@ -85,7 +87,8 @@ TEST(Fov, SymmetricSpansItsAngles) {
     EXPECT_NEAR(fov.width_rad(), radians(degrees), 1e-5) << degrees;
     EXPECT_FLOAT_EQ(fov.left, -fov.right);
   }
-  EXPECT_FLOAT_EQ(Fov::symmetric(radians(60), 16.0f / 9).right / Fov::symmetric(radians(60), 16.0f / 9).up, 16.0f / 9);
+  EXPECT_FLOAT_EQ(Fov::symmetric(radians(60), 16.0f / 9).right / Fov::symmetric(radians(60), 16.0f / 9).up,
+                  16.0f / 9);
 }
 
 TEST(Fov, WidensEachSideUpToTheLimit) {
@@ -120,8 +123,9 @@ TEST(View, PixelsPerRadianAtTheCentre) {
 
 // The catalogue's cameras: 1 and 179 degrees, and frusta that do not contain their axis.
 TEST(Projection, CornersOfTheFrustumMeetCornersOfTheScreen) {
-  const Fov fovs[] = {Fov::symmetric(radians(1), 1.5f),   Fov::symmetric(radians(179), 1), Fov::symmetric(radians(60), 2),
-                      Fov{-0.2f, 1.5f, -0.9f, 0.1f},      Fov{0.5f, 0.7f, -0.3f, -0.2f},   Fov{-100, 0.01f, -0.01f, 100}};
+  const Fov fovs[] = {Fov::symmetric(radians(1), 1.5f), Fov::symmetric(radians(179), 1),
+                      Fov::symmetric(radians(60), 2),   Fov{-0.2f, 1.5f, -0.9f, 0.1f},
+                      Fov{0.5f, 0.7f, -0.3f, -0.2f},    Fov{-100, 0.01f, -0.01f, 100}};
   for (const Fov& fov : fovs) {
     const mat4 matrix = projection_matrix(fov, kDefaultNearM);
     for (const float depth : {kDefaultNearM, 1.0f, 1000.0f, 1e6f}) {
@@ -179,10 +183,11 @@ TEST(ViewProjection, IsIndependentOfTheOrigin) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> uniform(-1, 1);
   for (int i = 0; i < 200; ++i) {
-    const View view{.pose = {dvec3(uniform(random), uniform(random), uniform(random)), random_rotation(random)},
-                    .fov = {-0.7f, 0.4f, -0.5f, 0.6f},
-                    .width = 100,
-                    .height = 100};
+    const View view{
+        .pose = {dvec3(uniform(random), uniform(random), uniform(random)), random_rotation(random)},
+        .fov = {-0.7f, 0.4f, -0.5f, 0.6f},
+        .width = 100,
+        .height = 100};
     const dvec3 direction(0.3 * uniform(random), 0.3 * uniform(random), -1);
     const dvec3 point = view.pose.position + view.pose.orientation * (4.0 * direction);
     const dvec3 origin(10 * uniform(random), uniform(random), uniform(random));

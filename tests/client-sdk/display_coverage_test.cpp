@@ -38,7 +38,8 @@ TEST(Coverage, WideBlocksHaveItToTheRight) {
     auto display = make_display(kSide, samples);
     SceneBuilder scene;
     scene.block(scene.screen(scene.object({.masked = true})), 4, 4, 4, 3);
-    expect_left_half(picture_of(*display, scene.state(), half_covered_atlas(8, 8, 8, 0), square_view(kSide)), kBackground, "wide");
+    expect_left_half(picture_of(*display, scene.state(), half_covered_atlas(8, 8, 8, 0), square_view(kSide)),
+                     kBackground, "wide");
   }
 }
 
@@ -47,7 +48,8 @@ TEST(Coverage, SquareBlocksHaveItBelow) {
     auto display = make_display(kSide, samples);
     SceneBuilder scene;
     scene.block(scene.screen(scene.object({.double_sided = true, .masked = true})), 4, 4, 4, 4);
-    expect_left_half(picture_of(*display, scene.state(), half_covered_atlas(16, 8, 0, 8), square_view(kSide)), kBackground, "square");
+    expect_left_half(picture_of(*display, scene.state(), half_covered_atlas(16, 8, 0, 8), square_view(kSide)),
+                     kBackground, "square");
   }
 }
 
@@ -58,7 +60,8 @@ TEST(Coverage, TransposedBlocksTurnBothHalves) {
   const uint32_t object = scene.object({.double_sided = true, .masked = true});
   const uint32_t patch = scene.patch(object, {{-1, -1, -1}, {-1, 1, -1}, {1, -1, -1}, {1, 1, -1}});
   scene.block(patch, 4, 4, 4, 3, true);
-  expect_left_half(picture_of(*display, scene.state(), half_covered_atlas(8, 8, 8, 0), square_view(kSide)), kBackground, "transposed");
+  expect_left_half(picture_of(*display, scene.state(), half_covered_atlas(8, 8, 8, 0), square_view(kSide)),
+                   kBackground, "transposed");
 }
 
 TEST(Coverage, HolesShowWhatLiesBehind) {
@@ -67,15 +70,18 @@ TEST(Coverage, HolesShowWhatLiesBehind) {
   scene.block(scene.screen(scene.object({.masked = true})), 4, 4, 4, 3);
   // Drawn after it: the same group, and farther away.
   scene.color(scene.rectangle(scene.object({.masked = true}), -3, -3, 3, 3, -2), {10, 20, 30});
-  expect_left_half(picture_of(*display, scene.state(), half_covered_atlas(8, 8, 8, 0), square_view(kSide)), {10, 20, 30}, "hole");
+  expect_left_half(picture_of(*display, scene.state(), half_covered_atlas(8, 8, 8, 0), square_view(kSide)),
+                   {10, 20, 30}, "hole");
 }
 
 TEST(Coverage, SingleColoursAreWhole) {
   auto display = make_display(kSide);
   SceneBuilder scene;
   scene.color(scene.screen(scene.object({.masked = true})), kGreen);
-  const Image8 image = picture_of(*display, scene.state(), half_covered_atlas(8, 8, 8, 0), square_view(kSide));
-  for (uint32_t p = 0; p < kSide * kSide; ++p) ASSERT_TRUE(near(pixel(image, p % kSide, p / kSide), kGreen, 0));
+  const Image8 image =
+      picture_of(*display, scene.state(), half_covered_atlas(8, 8, 8, 0), square_view(kSide));
+  for (uint32_t p = 0; p < kSide * kSide; ++p)
+    ASSERT_TRUE(near(pixel(image, p % kSide, p / kSide), kGreen, 0));
 }
 
 // An edge between two texels that falls inside a pixel must cover part of it.
@@ -83,9 +89,11 @@ TEST(Coverage, EdgesAreSmoothUnderMultisampling) {
   auto display = make_display(kSide, 4);
   SceneBuilder scene;
   // Slanted: the edge crosses pixels at all fractions.
-  const uint32_t patch = scene.patch(scene.object({.masked = true}), {{-1.2f, -1, -1}, {1.2f, -1, -1}, {-0.8f, 1, -1}, {1.6f, 1, -1}});
+  const uint32_t patch = scene.patch(scene.object({.masked = true}),
+                                     {{-1.2f, -1, -1}, {1.2f, -1, -1}, {-0.8f, 1, -1}, {1.6f, 1, -1}});
   scene.block(patch, 4, 4, 4, 3);
-  const Image8 image = picture_of(*display, scene.state(), half_covered_atlas(8, 8, 8, 0), square_view(kSide));
+  const Image8 image =
+      picture_of(*display, scene.state(), half_covered_atlas(8, 8, 8, 0), square_view(kSide));
   uint32_t partial = 0;
   for (uint32_t y = 0; y < kSide; ++y) {
     uint32_t partial_in_row = 0;

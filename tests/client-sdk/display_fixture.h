@@ -28,10 +28,13 @@ inline Rgb pixel(const Image8& image, uint32_t x, uint32_t y) {
 }
 
 inline bool near(Rgb a, Rgb b, int tolerance) {
-  return std::abs(a.r - b.r) <= tolerance && std::abs(a.g - b.g) <= tolerance && std::abs(a.b - b.b) <= tolerance;
+  return std::abs(a.r - b.r) <= tolerance && std::abs(a.g - b.g) <= tolerance &&
+         std::abs(a.b - b.b) <= tolerance;
 }
 
-inline std::ostream& operator<<(std::ostream& out, const Rgb& c) { return out << c.r << "," << c.g << "," << c.b; }
+inline std::ostream& operator<<(std::ostream& out, const Rgb& c) {
+  return out << c.r << "," << c.g << "," << c.b;
+}
 
 inline uint32_t packed(Rgb c) {
   return static_cast<uint32_t>(c.r) | static_cast<uint32_t>(c.g) << 8 | static_cast<uint32_t>(c.b) << 16;
@@ -49,11 +52,13 @@ inline void fill(Image8& image, uint32_t x0, uint32_t y0, uint32_t width, uint32
   }
 }
 
-// Red = 8 x, green = 8 y: a bilinear fetch at texel coordinate t reads 8 (t - 0.5), so pictures tell where they sampled.
+// Red = 8 x, green = 8 y: a bilinear fetch at texel coordinate t reads 8 (t - 0.5), so pictures tell where
+// they sampled.
 inline Image8 ramp_atlas() {
   Image8 atlas(kAtlasSide, kAtlasSide);
   for (uint32_t y = 0; y < kAtlasSide; ++y) {
-    for (uint32_t x = 0; x < kAtlasSide; ++x) fill(atlas, x, y, 1, 1, {static_cast<int>(8 * x), static_cast<int>(8 * y), 0});
+    for (uint32_t x = 0; x < kAtlasSide; ++x)
+      fill(atlas, x, y, 1, 1, {static_cast<int>(8 * x), static_cast<int>(8 * y), 0});
   }
   return atlas;
 }
@@ -72,7 +77,8 @@ class SceneBuilder {
     meta_.meshes.push_back({.step = 1.0 / 65536});
   }
 
-  uint32_t object(const ObjectFlags& flags = {}, const dvec3& translation = dvec3(0), const vec3& scale = vec3(1)) {
+  uint32_t object(const ObjectFlags& flags = {}, const dvec3& translation = dvec3(0),
+                  const vec3& scale = vec3(1)) {
     geometry_compression::Transform transform;
     transform.linear = {scale.x, 0, 0, 0, scale.y, 0, 0, 0, scale.z};
     transform.translation = {translation.x, translation.y, translation.z};
@@ -82,7 +88,8 @@ class SceneBuilder {
 
   // Corners in the order of scene::Patch; 3, 4 or 5 of them.
   uint32_t patch(uint32_t object, const std::vector<vec3>& corners) {
-    geometry_compression::NewPatch patch{.object = object, .triangles = static_cast<uint8_t>(corners.size() - 2)};
+    geometry_compression::NewPatch patch{.object = object,
+                                         .triangles = static_cast<uint8_t>(corners.size() - 2)};
     for (size_t i = 0; i < corners.size(); ++i) {
       patch.vertices[i] = static_cast<uint32_t>(meta_.vertices.size());
       const vec3 q = glm::round(corners[i] * 65536.0f);
@@ -103,7 +110,8 @@ class SceneBuilder {
     meta_.placements.push_back(
         {.patch = patch, .kind = geometry_compression::PlacementKind::color, .rgb = packed(rgb)});
   }
-  void block(uint32_t patch, uint32_t x, uint32_t y, uint32_t log_w, uint32_t log_h, bool transposed = false) {
+  void block(uint32_t patch, uint32_t x, uint32_t y, uint32_t log_w, uint32_t log_h,
+             bool transposed = false) {
     meta_.placements.push_back({.patch = patch,
                                 .kind = geometry_compression::PlacementKind::block,
                                 .x = static_cast<uint16_t>(x),
@@ -135,7 +143,8 @@ inline View square_view(uint32_t side, const dvec3& position = dvec3(0)) {
 constexpr Rgb kBackground{0, 0, 60};
 
 inline std::unique_ptr<Display> make_display(uint32_t side = 64, uint32_t samples = 4) {
-  auto display = Display::create({.width = side, .height = side, .samples = samples, .background = {0, 0, 60}});
+  auto display =
+      Display::create({.width = side, .height = side, .samples = samples, .background = {0, 0, 60}});
   if (!display.ok()) {
     ADD_FAILURE() << display.status();
     std::abort();

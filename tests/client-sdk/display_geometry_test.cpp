@@ -38,9 +38,11 @@ TEST(Geometry, OnlyFrontFacesOfSingleSidedObjectsAreDrawn) {
   for (bool masked : {false, true}) {
     for (bool mirrored : {false, true}) {
       EXPECT_TRUE(is_visible(*display, true, {.mirrored = mirrored, .masked = masked})) << mirrored << masked;
-      EXPECT_FALSE(is_visible(*display, false, {.mirrored = mirrored, .masked = masked})) << mirrored << masked;
+      EXPECT_FALSE(is_visible(*display, false, {.mirrored = mirrored, .masked = masked}))
+          << mirrored << masked;
       EXPECT_TRUE(is_visible(*display, true, {.mirrored = mirrored, .double_sided = true, .masked = masked}));
-      EXPECT_TRUE(is_visible(*display, false, {.mirrored = mirrored, .double_sided = true, .masked = masked}));
+      EXPECT_TRUE(
+          is_visible(*display, false, {.mirrored = mirrored, .double_sided = true, .masked = masked}));
     }
   }
 }
@@ -49,13 +51,18 @@ TEST(Geometry, OnlyFrontFacesOfSingleSidedObjectsAreDrawn) {
 TEST(Geometry, MirroredObjectsShowTheMirroredPicture) {
   auto display = make_display(kSide);
   for (size_t corners : {3u, 4u, 5u}) {
-    const std::vector<vec3> all = {{-1, -1, -1}, {1, -1, -1}, corners == 5 ? vec3(0, 1, -1) : vec3(-1, 1, -1),
-                                   corners == 5 ? vec3(-1, 1, -1) : vec3(1, 1, -1), {1, 1, -1}};
+    const std::vector<vec3> all = {{-1, -1, -1},
+                                   {1, -1, -1},
+                                   corners == 5 ? vec3(0, 1, -1) : vec3(-1, 1, -1),
+                                   corners == 5 ? vec3(-1, 1, -1) : vec3(1, 1, -1),
+                                   {1, 1, -1}};
     const std::vector<vec3> used(all.begin(), all.begin() + static_cast<ptrdiff_t>(corners));
     std::array<Image8, 2> images;
     for (bool mirrored : {false, true}) {
       SceneBuilder scene;
-      scene.block(scene.patch(scene.object({.mirrored = mirrored}, dvec3(0), vec3(mirrored ? -1 : 1, 1, 1)), used), 4, 4, 4, 3);
+      scene.block(
+          scene.patch(scene.object({.mirrored = mirrored}, dvec3(0), vec3(mirrored ? -1 : 1, 1, 1)), used), 4,
+          4, 4, 3);
       images[mirrored] = picture_of(*display, scene.state(), ramp_atlas(), square_view(kSide));
     }
     size_t differing = 0;
@@ -65,23 +72,28 @@ TEST(Geometry, MirroredObjectsShowTheMirroredPicture) {
       }
     }
     EXPECT_LE(differing, 2 * kSide) << "the edges' samples are not symmetric";
-    EXPECT_FALSE(near(pixel(images[0], 4, kSide - 4), pixel(images[0], kSide - 12, kSide - 4), 20)) << "the test itself";
+    EXPECT_FALSE(near(pixel(images[0], 4, kSide - 4), pixel(images[0], kSide - 12, kSide - 4), 20))
+        << "the test itself";
   }
 }
 
 TEST(Geometry, NearerSurfacesHideFartherOnesInAnyOrder) {
   auto display = make_display(kSide);
   // Distances and gaps that a fixed-point depth buffer would not tell apart.
-  for (const auto& [front, gap] : {std::pair{1.0f, 0.001f}, {100.0f, 0.01f}, {1000.0f, 0.0625f}, {10000.0f, 1.0f}}) {
+  for (const auto& [front, gap] :
+       {std::pair{1.0f, 0.001f}, {100.0f, 0.01f}, {1000.0f, 0.0625f}, {10000.0f, 1.0f}}) {
     for (bool front_first : {false, true}) {
       SceneBuilder scene;
       const uint32_t object = scene.object();
       const float size = 2 * (front + gap);
-      const uint32_t first = scene.rectangle(object, -size, -size, size, size, -(front_first ? front : front + gap));
-      const uint32_t second = scene.rectangle(object, -size, -size, size, size, -(front_first ? front + gap : front));
+      const uint32_t first =
+          scene.rectangle(object, -size, -size, size, size, -(front_first ? front : front + gap));
+      const uint32_t second =
+          scene.rectangle(object, -size, -size, size, size, -(front_first ? front + gap : front));
       scene.color(first, front_first ? kGreen : kRed);
       scene.color(second, front_first ? kRed : kGreen);
-      EXPECT_TRUE(near(center_of(scene, *display), kGreen, 0)) << front << " m, gap " << gap << (front_first ? " first" : " second");
+      EXPECT_TRUE(near(center_of(scene, *display), kGreen, 0))
+          << front << " m, gap " << gap << (front_first ? " first" : " second");
     }
   }
 }
@@ -142,11 +154,13 @@ TEST(Geometry, StereoParallaxHasTheRightSignAndSize) {
     ASSERT_TRUE(display->set_atlas(ramp_atlas()).ok());
     ASSERT_TRUE(display->set_state(scene.state()).ok());
     constexpr double kEyeM = 0.125;
-    const auto images = display->draw_stereo(square_view(kSide, {-kEyeM, 0, 0}), square_view(kSide, {kEyeM, 0, 0}));
+    const auto images =
+        display->draw_stereo(square_view(kSide, {-kEyeM, 0, 0}), square_view(kSide, {kEyeM, 0, 0}));
     ASSERT_TRUE(images.ok()) << images.status();
     const auto left = leftmost_green(images->left), right = leftmost_green(images->right);
     ASSERT_TRUE(left && right);
-    EXPECT_EQ(*left - *right, static_cast<uint32_t>(2 * kEyeM / distance * kSide / 2)) << "the left eye sees it farther right";
+    EXPECT_EQ(*left - *right, static_cast<uint32_t>(2 * kEyeM / distance * kSide / 2))
+        << "the left eye sees it farther right";
   }
 }
 
@@ -158,11 +172,13 @@ TEST(Geometry, IsAsPreciseFarFromTheOrigin) {
     SceneBuilder scene;
     const uint32_t patch = scene.rectangle(scene.object({}, origin), -0.01f, -0.01f, 0.01f, 0.02f, -0.0625f);
     scene.block(patch, 4, 4, 3, 3);
-    const Image8 image = picture_of(*display, scene.state(), ramp_atlas(), square_view(kSide, origin + dvec3(0.001, 0, 0)));
+    const Image8 image =
+        picture_of(*display, scene.state(), ramp_atlas(), square_view(kSide, origin + dvec3(0.001, 0, 0)));
     if (!at_origin) at_origin = image;
     size_t differing = 0;
     for (uint32_t p = 0; p < kSide * kSide; ++p) {
-      differing += near(pixel(image, p % kSide, p / kSide), pixel(*at_origin, p % kSide, p / kSide), 2) ? 0 : 1;
+      differing +=
+          near(pixel(image, p % kSide, p / kSide), pixel(*at_origin, p % kSide, p / kSide), 2) ? 0 : 1;
     }
     EXPECT_EQ(differing, 0u) << origin.x;
     EXPECT_FALSE(near(pixel(image, kSide / 2, kSide / 2), kBackground, 5));

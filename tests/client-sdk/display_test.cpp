@@ -33,17 +33,22 @@ using Triangle = std::array<vec2, 3>;
 const std::vector<std::vector<Triangle>> kPatchTriangles = {
     {{vec2(0, 0), vec2(1, 0), vec2(0, 1)}},
     {{vec2(0, 0), vec2(1, 0), vec2(0, 1)}, {vec2(1, 1), vec2(0, 1), vec2(1, 0)}},
-    {{vec2(0, 0), vec2(1, 0), vec2(.5f, 1)}, {vec2(0, 1), vec2(0, 0), vec2(.5f, 1)}, {vec2(1, 0), vec2(1, 1), vec2(.5f, 1)}}};
+    {{vec2(0, 0), vec2(1, 0), vec2(.5f, 1)},
+     {vec2(0, 1), vec2(0, 0), vec2(.5f, 1)},
+     {vec2(1, 0), vec2(1, 1), vec2(.5f, 1)}}};
 const std::vector<std::vector<vec2>> kPatchCorners = {
     {{0, 0}, {1, 0}, {0, 1}}, {{0, 0}, {1, 0}, {0, 1}, {1, 1}}, {{0, 0}, {1, 0}, {.5f, 1}, {0, 1}, {1, 1}}};
 
 vec3 barycentric(const Triangle& t, vec2 p) {
-  const auto area = [](vec2 a, vec2 b, vec2 c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); };
+  const auto area = [](vec2 a, vec2 b, vec2 c) {
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+  };
   const float whole = area(t[0], t[1], t[2]);
   return {area(p, t[1], t[2]) / whole, area(t[0], p, t[2]) / whole, area(t[0], t[1], p) / whole};
 }
 
-// Every corner kind, both orientations, square, wide and high blocks: the picture's colours say where it sampled.
+// Every corner kind, both orientations, square, wide and high blocks: the picture's colours say where it
+// sampled.
 TEST(Display, SamplesWhereThePlacementSays) {
   auto display = make_display(kSide);
   for (size_t triangles = 1; triangles <= 3; ++triangles) {
@@ -62,13 +67,15 @@ TEST(Display, SamplesWhereThePlacementSays) {
               if (b.x < 0.02f || b.y < 0.02f || b.z < 0.02f) continue;  // another triangle, or a shared pixel
               vec2 texel(0);
               for (int i = 0; i < 3; ++i) {
-                texel += b[i] * corner_texel(triangle[i], vec2(6, 10), vec2(1 << log_w, 1 << log_h), transposed);
+                texel +=
+                    b[i] * corner_texel(triangle[i], vec2(6, 10), vec2(1 << log_w, 1 << log_h), transposed);
               }
               ++checked;
-              const Rgb expected{int(std::lround(8 * (texel.x - .5f))), int(std::lround(8 * (texel.y - .5f))), 0};
+              const Rgb expected{int(std::lround(8 * (texel.x - .5f))), int(std::lround(8 * (texel.y - .5f))),
+                                 0};
               ASSERT_TRUE(near(pixel(image, x, y), expected, 1))
-                  << triangles << " triangles, " << log_w << "x" << log_h << (transposed ? " transposed" : "") << " at " << x
-                  << "," << y << ": " << pixel(image, x, y) << " instead of " << expected;
+                  << triangles << " triangles, " << log_w << "x" << log_h << (transposed ? " transposed" : "")
+                  << " at " << x << "," << y << ": " << pixel(image, x, y) << " instead of " << expected;
             }
           }
         }
@@ -86,7 +93,8 @@ TEST(Display, RowZeroIsTheTop) {
   const Image8 image = picture_of(*display, scene.state(), ramp_atlas(), square_view(kSide));
   for (uint32_t x = 0; x < kSide; ++x) {
     for (uint32_t y = 0; y < kSide; ++y) {
-      ASSERT_TRUE(near(pixel(image, x, y), y < kSide / 2 ? Rgb{200, 10, 20} : kBackground, 0)) << x << "," << y;
+      ASSERT_TRUE(near(pixel(image, x, y), y < kSide / 2 ? Rgb{200, 10, 20} : kBackground, 0))
+          << x << "," << y;
       ASSERT_EQ(image.at(x, y)[3], 255);
     }
   }
@@ -105,11 +113,14 @@ TEST(Display, NeighboursNeverBleedIntoABlock) {
       for (int i = 0; i < 25; ++i) {
         SceneBuilder scene;
         const vec3 origin(0.5f * coordinate(), 0.5f * coordinate(), -1.2f + 0.5f * coordinate());
-        const vec3 right(coordinate(), coordinate(), coordinate()), up(coordinate(), coordinate(), coordinate());
-        const uint32_t patch = scene.patch(scene.object({.double_sided = true}), {origin, origin + right, origin + up, origin + right + up});
+        const vec3 right(coordinate(), coordinate(), coordinate()),
+            up(coordinate(), coordinate(), coordinate());
+        const uint32_t patch = scene.patch(scene.object({.double_sided = true}),
+                                           {origin, origin + right, origin + up, origin + right + up});
         scene.block(patch, 8, 8, log_w, log_h, i % 2 == 0);
         const Image8 image = picture_of(*display, scene.state(), atlas, square_view(kSide));
-        for (uint32_t p = 0; p < kSide * kSide; ++p) ASSERT_EQ(image.rgba[4 * p], 0) << "red can only come from a neighbour";
+        for (uint32_t p = 0; p < kSide * kSide; ++p)
+          ASSERT_EQ(image.rgba[4 * p], 0) << "red can only come from a neighbour";
       }
     }
   }
@@ -121,7 +132,8 @@ TEST(Display, SingleColoursAreExact) {
     SceneBuilder scene;
     scene.color(scene.screen(scene.object()), color);
     const Image8 image = picture_of(*display, scene.state(), ramp_atlas(), square_view(kSide));
-    for (uint32_t p = 0; p < kSide * kSide; ++p) ASSERT_TRUE(near(pixel(image, p % kSide, p / kSide), color, 0));
+    for (uint32_t p = 0; p < kSide * kSide; ++p)
+      ASSERT_TRUE(near(pixel(image, p % kSide, p / kSide), color, 0));
   }
 }
 
@@ -137,7 +149,8 @@ YuvImage random_yuv() {
   return yuv;
 }
 
-// Screen pixel = texel, so each one shows its conversion alone. All code values, also those beyond the limited range.
+// Screen pixel = texel, so each one shows its conversion alone. All code values, also those beyond the
+// limited range.
 TEST(Display, ConvertsYuvAsTheReferenceDoes) {
   auto display = make_display(kAtlasSide, 1);
   const YuvImage yuv = random_yuv();
@@ -145,8 +158,9 @@ TEST(Display, ConvertsYuvAsTheReferenceDoes) {
   SceneBuilder scene;
   // Between the centres of the first and last pixel.
   constexpr float kEdge = 1 - 1.0f / kAtlasSide;
-  const uint32_t patch = scene.patch(scene.object({.double_sided = true}),
-      {{-kEdge, kEdge, -1}, {kEdge, kEdge, -1}, {-kEdge, -kEdge, -1}, {kEdge, -kEdge, -1}});
+  const uint32_t patch =
+      scene.patch(scene.object({.double_sided = true}),
+                  {{-kEdge, kEdge, -1}, {kEdge, kEdge, -1}, {-kEdge, -kEdge, -1}, {kEdge, -kEdge, -1}});
   scene.block(patch, 0, 0, 5, 5);
   const Image8 image = picture_of(*display, scene.state(), codec::view_of(yuv), square_view(kAtlasSide));
   for (uint32_t y = 1; y + 1 < kAtlasSide; ++y) {
@@ -159,14 +173,16 @@ TEST(Display, ConvertsYuvAsTheReferenceDoes) {
 TEST(Display, ChromaIsReplicatedNotFilteredAcrossBlocks) {
   auto display = make_display(kSide);
   YuvImage yuv = random_yuv();  // neighbours of every colour
-  for (uint32_t i : {8u * kAtlasSide + 8, 8u * kAtlasSide + 9, 9u * kAtlasSide + 8, 9u * kAtlasSide + 9}) yuv.y[i] = 120;
+  for (uint32_t i : {8u * kAtlasSide + 8, 8u * kAtlasSide + 9, 9u * kAtlasSide + 8, 9u * kAtlasSide + 9})
+    yuv.y[i] = 120;
   yuv.u[4 * kAtlasSide / 2 + 4] = 200;
   yuv.v[4 * kAtlasSide / 2 + 4] = 60;
   const Rgb expected = pixel(codec::yuv_to_rgb(codec::view_of(yuv)), 8, 8);
   SceneBuilder scene;
   scene.block(scene.screen(scene.object()), 8, 8, 1, 1);
   const Image8 image = picture_of(*display, scene.state(), codec::view_of(yuv), square_view(kSide));
-  for (uint32_t p = 0; p < kSide * kSide; ++p) ASSERT_TRUE(near(pixel(image, p % kSide, p / kSide), expected, 1));
+  for (uint32_t p = 0; p < kSide * kSide; ++p)
+    ASSERT_TRUE(near(pixel(image, p % kSide, p / kSide), expected, 1));
 }
 
 // More records and vertices than one row of the tables; then changes to a few of them.
@@ -177,11 +193,13 @@ TEST(Display, FollowsChangesInLargeScenes) {
   SceneBuilder scene;
   const uint32_t object = scene.object();
   const auto color_of = [](uint32_t patch, uint32_t frame) {
-    return Rgb{static_cast<int>(patch % 251), static_cast<int>(patch / 251 * 10), static_cast<int>(frame * 30)};
+    return Rgb{static_cast<int>(patch % 251), static_cast<int>(patch / 251 * 10),
+               static_cast<int>(frame * 30)};
   };
   constexpr float kCell = 2.0f / kColumns;
   for (uint32_t i = 0; i < kColumns * kColumns; ++i) {
-    const float x = -1 + kCell * static_cast<float>(i % kColumns), y = 1 - kCell * static_cast<float>(i / kColumns + 1);
+    const float x = -1 + kCell * static_cast<float>(i % kColumns),
+                y = 1 - kCell * static_cast<float>(i / kColumns + 1);
     scene.color(scene.rectangle(object, x, y, x + kCell, y + kCell, -1), color_of(i, 0));
   }
   store.apply(scene.meta());
@@ -191,7 +209,8 @@ TEST(Display, FollowsChangesInLargeScenes) {
   for (uint32_t frame = 0; frame < 6; ++frame) {
     const Image8 image = picture_of(*display, store.state(), ramp_atlas(), square_view(kColumns));
     for (uint32_t i = 0; i < kColumns * kColumns; ++i) {
-      ASSERT_TRUE(near(pixel(image, i % kColumns, i / kColumns), visible[i] ? color_of(i, changed_in[i]) : kBackground, 0))
+      ASSERT_TRUE(near(pixel(image, i % kColumns, i / kColumns),
+                       visible[i] ? color_of(i, changed_in[i]) : kBackground, 0))
           << "frame " << frame << " patch " << i;
     }
     geometry_compression::MetaFrame next;
@@ -220,7 +239,8 @@ TEST(Display, ShowsTheBackgroundBeforeAnyState) {
 
 TEST(Display, RefusesWhatDoesNotFit) {
   auto display = make_display(kSide);
-  EXPECT_THAT(std::string(display->draw(square_view(32)).status().message()), HasSubstr("32x32 pixels, but the display was made for 64x64"));
+  EXPECT_THAT(std::string(display->draw(square_view(32)).status().message()),
+              HasSubstr("32x32 pixels, but the display was made for 64x64"));
   View empty = square_view(kSide);
   empty.fov.left = 2;
   EXPECT_EQ(display->draw(empty).status().code(), absl::StatusCode::kInvalidArgument);
@@ -229,7 +249,8 @@ TEST(Display, RefusesWhatDoesNotFit) {
   ASSERT_TRUE(display->set_state(scene.state()).ok());
   ASSERT_TRUE(display->set_atlas(Image8(16, 16)).ok());
   EXPECT_EQ(display->draw(square_view(kSide)).status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_EQ(display->set_atlas(YuvView{.width = 15, .height = 16}).code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(display->set_atlas(YuvView{.width = 15, .height = 16}).code(),
+            absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(display->set_atlas(Image8(1u << 20, 1)).code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(Display::create({.samples = 99}).status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(Display::create({.width = 0}).status().code(), absl::StatusCode::kInvalidArgument);

@@ -13,7 +13,8 @@ using geometry_compression::MetaFrame;
 using geometry_compression::PatchPlacement;
 using geometry_compression::PlacementKind;
 
-// A first frame: one mesh of 1 m steps, one object, `patches` patches of `triangles` triangles on the same five vertices.
+// A first frame: one mesh of 1 m steps, one object, `patches` patches of `triangles` triangles on the same
+// five vertices.
 inline MetaFrame first_frame(uint32_t frame, uint32_t patches = 1, uint8_t triangles = 2) {
   MetaFrame meta;
   meta.frame = frame;
@@ -45,6 +46,8 @@ inline PatchPlacement in_block(uint32_t patch, uint16_t x, uint16_t y, uint8_t l
   return {.patch = patch, .kind = PlacementKind::block, .x = x, .y = y, .log_w = log_w, .log_h = log_h};
 }
 
-inline PatchPlacement gone(uint32_t patch) { return {.patch = patch}; }
+inline PatchPlacement gone(uint32_t patch) {
+  return {.patch = patch};
+}
 
 }  // namespace tessera::client::test

@@ -48,7 +48,9 @@ struct HostileCase {
   std::function<void(MetaFrame&)> damage;
 };
 
-void PrintTo(const HostileCase& c, std::ostream* out) { *out << c.named; }
+void PrintTo(const HostileCase& c, std::ostream* out) {
+  *out << c.named;
+}
 
 class Hostile : public ::testing::TestWithParam<HostileCase> {};
 
@@ -77,27 +79,45 @@ const HostileCase kHostile[] = {
     {"atlas_width is 8194", [](MetaFrame& f) { f.atlas_width = 8194; }},
     {"meshes.step of entry", [](MetaFrame& f) { f.meshes.push_back({.step = 0}); }},
     {"meshes.step of entry", [](MetaFrame& f) { f.meshes.push_back({.step = kNan}); }},
-    {"meshes.offset of entry", [](MetaFrame& f) { f.meshes.push_back({.offset = {0, kInf, 0}}); }},
+    {"meshes.offset of entry",
+     [](MetaFrame& f) {
+       f.meshes.push_back({.offset = {0, kInf, 0}});
+     }},
     {"vertices.mesh of entry", [](MetaFrame& f) { f.vertices.push_back({.mesh = 1}); }},
-    {"1073741824", [](MetaFrame& f) { f.vertices.push_back({.q = {0, 1 << 30, 0}}); }},
-    {"-2147483648", [](MetaFrame& f) { f.vertices.push_back({.q = {0, 0, std::numeric_limits<int32_t>::min()}}); }},
+    {"1073741824",
+     [](MetaFrame& f) {
+       f.vertices.push_back({.q = {0, 1 << 30, 0}});
+     }},
+    {"-2147483648",
+     [](MetaFrame& f) {
+       f.vertices.push_back({.q = {0, 0, std::numeric_limits<int32_t>::min()}});
+     }},
     {"outside the range of float",
      [](MetaFrame& f) {
        f.meshes.push_back({.step = 1e38});
        f.vertices.push_back({.mesh = 1, .q = {9, 0, 0}});
      }},
     {"objects.translation",
-     [](MetaFrame& f) { f.objects.push_back({.transform = {.translation = {0, kNan, 0}}}); }},
+     [](MetaFrame& f) {
+       f.objects.push_back({.transform = {.translation = {0, kNan, 0}}});
+     }},
     {"objects.linear", [](MetaFrame& f) { f.objects.push_back({.transform = {.linear = {float(kInf)}}}); }},
     {"moved.object of entry 0 is 1", [](MetaFrame& f) { f.moved.push_back({.object = 1}); }},
-    {"moved.translation", [](MetaFrame& f) { f.moved.push_back({.transform = {.translation = {kInf, 0, 0}}}); }},
+    {"moved.translation",
+     [](MetaFrame& f) {
+       f.moved.push_back({.transform = {.translation = {kInf, 0, 0}}});
+     }},
     {"patches.object", [](MetaFrame& f) { f.patches.push_back({.object = 1}); }},
-    {"patches.vertices", [](MetaFrame& f) { f.patches.push_back({.vertices = {0, 1, 5}}); }},
+    {"patches.vertices",
+     [](MetaFrame& f) {
+       f.patches.push_back({.vertices = {0, 1, 5}});
+     }},
     {"patches.triangles", [](MetaFrame& f) { f.patches.push_back({.triangles = 0}); }},
     {"patches.triangles", [](MetaFrame& f) { f.patches.push_back({.triangles = 4}); }},
     {"placements.patch of entry 0 is 1", [](MetaFrame& f) { f.placements.push_back(in_color(1, 0)); }},
     {"placements.rgb", [](MetaFrame& f) { f.placements.push_back(in_color(0, 0x1000000)); }},
-    {"placements.kind", [](MetaFrame& f) { f.placements.push_back({.kind = static_cast<PlacementKind>(3)}); }},
+    {"placements.kind",
+     [](MetaFrame& f) { f.placements.push_back({.kind = static_cast<PlacementKind>(3)}); }},
     {"placements.log_w", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 0, 0, 1)); }},
     {"placements.log_w", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 0, 1, 9)); }},
     {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 1, 0, 1, 1)); }},
@@ -130,7 +150,8 @@ TEST(MetaChecker, CountsAreCumulativeAndForgottenWithAFullState) {
   ASSERT_TRUE(checker.check(first_frame(4)).ok());
   MetaFrame stale = next_frame(5);
   stale.moved.push_back({.object = 1000});
-  EXPECT_THAT(std::string(checker.check(stale).message()), HasSubstr("moved.object of entry 0 is 1000, but only 1"));
+  EXPECT_THAT(std::string(checker.check(stale).message()),
+              HasSubstr("moved.object of entry 0 is 1000, but only 1"));
 }
 
 }  // namespace

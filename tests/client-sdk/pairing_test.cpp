@@ -21,7 +21,8 @@ using ::testing::HasSubstr;
 // Frame numbers start just before the wrap-around in most tests.
 constexpr FrameNumber kStart = 0xfffffffeu;
 
-// Feeds frames by their index. The picture's luma and the one patch's colour both say which frame they belong to.
+// Feeds frames by their index. The picture's luma and the one patch's colour both say which frame they belong
+// to.
 class Bench {
  public:
   explicit Bench(FrameNumber start = kStart) : start_(start) {}
@@ -169,7 +170,8 @@ TEST(Pairing, AStalledMetaChannelLowersTheRateButDoesNotStopThePairs) {
       shown += bench.take().has_value() ? 1 : 0;
     }
     // At best as many per delay as wait at a time; at least half of that.
-    const uint32_t possible = (250 - delay) * std::min<uint32_t>(delay, Pairing::kMaxWaitingAtlases - 1) / delay;
+    const uint32_t possible =
+        (250 - delay) * std::min<uint32_t>(delay, Pairing::kMaxWaitingAtlases - 1) / delay;
     EXPECT_GE(shown, possible / 2) << delay;
   }
 }

@@ -43,8 +43,16 @@ TEST(TriangleRecord, FieldsDoNotDisturbEachOther) {
 
 // The layout is shared with shaders, so the bits themselves are pinned.
 TEST(TriangleRecord, BitsAreWhereTheHeaderSays) {
-  const TriangleRecord block = pack({.vertices = {1, 2, 3}, .object = (5u << 10) | 9, .corner_kind = 4, .transposed = true,
-                                     .masked = true, .reversed = true, .x = 10, .y = 20, .log_w = 3, .log_h = 2});
+  const TriangleRecord block = pack({.vertices = {1, 2, 3},
+                                     .object = (5u << 10) | 9,
+                                     .corner_kind = 4,
+                                     .transposed = true,
+                                     .masked = true,
+                                     .reversed = true,
+                                     .x = 10,
+                                     .y = 20,
+                                     .log_w = 3,
+                                     .log_h = 2});
   EXPECT_EQ(block.a, 1u | 4u << 22 | 1u << 25 | 1u << 26 | 1u << 27);
   EXPECT_EQ(block.b, 2u | 9u << 22);
   EXPECT_EQ(block.c, 3u | 5u << 22);

@@ -130,7 +130,8 @@ PatchPlacement random_placement(uint32_t patch, std::mt19937& random) {
     case 1:
       return in_color(patch, patch * 7919u & 0xffffffu);
     default:
-      return in_block(patch, static_cast<uint16_t>(patch % 64 * 2), static_cast<uint16_t>(patch / 64 * 2), 1, 1);
+      return in_block(patch, static_cast<uint16_t>(patch % 64 * 2), static_cast<uint16_t>(patch / 64 * 2), 1,
+                      1);
   }
 }
 
@@ -141,7 +142,8 @@ TEST(SceneStore, RandomChangesLeaveExactlyWhatANaiveModelHolds) {
   first.objects.resize(8);
   for (uint32_t i = 0; i < 8; ++i) first.objects[i] = {{}, (i & 1) != 0, (i & 2) != 0, (i & 4) != 0};
   for (uint32_t i = 0; i < kPatches; ++i) {
-    first.patches.push_back({.object = i % 8, .triangles = static_cast<uint8_t>(1 + random() % 3), .vertices = {0, 1, 2, 3, 4}});
+    first.patches.push_back(
+        {.object = i % 8, .triangles = static_cast<uint8_t>(1 + random() % 3), .vertices = {0, 1, 2, 3, 4}});
   }
   SceneStore store;
   NaiveModel model(first);
@@ -150,7 +152,8 @@ TEST(SceneStore, RandomChangesLeaveExactlyWhatANaiveModelHolds) {
   for (uint32_t frame = 2; frame < 200; ++frame) {
     MetaFrame meta = next_frame(frame);
     const uint32_t stride = 1 + random() % 40;
-    for (uint32_t p = random() % stride; p < kPatches; p += stride) meta.placements.push_back(random_placement(p, random));
+    for (uint32_t p = random() % stride; p < kPatches; p += stride)
+      meta.placements.push_back(random_placement(p, random));
     store.apply(meta);
     model.apply(meta);
     const auto expected = model.records();

@@ -10,7 +10,9 @@ namespace tessera::geometry_compression {
 namespace {
 
 // On the heap at the exact size, so that the address sanitizer sees a read past the end.
-std::vector<uint8_t> exactly(std::span<const uint8_t> bytes) { return {bytes.begin(), bytes.end()}; }
+std::vector<uint8_t> exactly(std::span<const uint8_t> bytes) {
+  return {bytes.begin(), bytes.end()};
+}
 
 TEST(BitIo, EveryWidthKeepsItsValue) {
   std::mt19937_64 random(1);
@@ -36,9 +38,10 @@ TEST(BitIo, ExpGolombHasTheTextbookCodes) {
     uint32_t value, order;
     uint64_t code;
     uint32_t bits;
-  } known[] = {{0, 0, 0b1, 1},    {1, 0, 0b010, 3}, {2, 0, 0b011, 3},   {3, 0, 0b00100, 5}, {6, 0, 0b00111, 5},
-               {7, 0, 0b0001000, 7}, {0, 1, 0b10, 2},  {1, 1, 0b11, 2},    {2, 1, 0b0100, 4},  {5, 1, 0b0111, 4},
-               {0, 3, 0b1000, 4},    {7, 3, 0b1111, 4}, {8, 3, 0b010000, 6}};
+  } known[] = {{0, 0, 0b1, 1},     {1, 0, 0b010, 3},     {2, 0, 0b011, 3},  {3, 0, 0b00100, 5},
+               {6, 0, 0b00111, 5}, {7, 0, 0b0001000, 7}, {0, 1, 0b10, 2},   {1, 1, 0b11, 2},
+               {2, 1, 0b0100, 4},  {5, 1, 0b0111, 4},    {0, 3, 0b1000, 4}, {7, 3, 0b1111, 4},
+               {8, 3, 0b010000, 6}};
   for (const auto& k : known) {
     BitWriter out;
     out.put_unsigned(k.value, k.order);
@@ -118,7 +121,8 @@ TEST(Columns, KeepRunsOfEveryKindAndLength) {
   for (uint32_t count : {0u, 1u, 63u, 64u, 65u, 128u, 1000u})
     for (uint32_t shift : {0u, 8u, 20u, 31u}) {
       std::vector<uint32_t> values(count);
-      for (uint32_t i = 0; i < count; ++i) values[i] = i / 100 % 2 ? 0 : static_cast<uint32_t>(random()) >> shift;
+      for (uint32_t i = 0; i < count; ++i)
+        values[i] = i / 100 % 2 ? 0 : static_cast<uint32_t>(random()) >> shift;
       BitWriter out;
       write_column(out, values);
       write_repeats(out, values);
@@ -126,7 +130,8 @@ TEST(Columns, KeepRunsOfEveryKindAndLength) {
       BitReader in(bytes);
       EXPECT_EQ(read_column(in, count), values);
       std::vector<uint32_t> repeats;
-      EXPECT_TRUE(read_repeats(in, count, [&](uint32_t n, uint32_t v) { repeats.insert(repeats.end(), n, v); }));
+      EXPECT_TRUE(
+          read_repeats(in, count, [&](uint32_t n, uint32_t v) { repeats.insert(repeats.end(), n, v); }));
       EXPECT_EQ(repeats, values);
     }
 }

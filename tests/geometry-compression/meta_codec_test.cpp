@@ -13,14 +13,17 @@ namespace {
 void expect_round_trip(const MetaFrame& frame) {
   MetaBits bits;
   const auto bytes = encode(frame, &bits);
-  const uint64_t sum = bits.header + bits.meshes + bits.vertices + bits.objects + bits.moved + bits.patches + bits.placements;
+  const uint64_t sum =
+      bits.header + bits.meshes + bits.vertices + bits.objects + bits.moved + bits.patches + bits.placements;
   EXPECT_EQ(bytes.size(), (sum + 7) / 8);
   MetaFrame decoded;
   ASSERT_EQ(decode(bytes, decoded), "");
   ASSERT_TRUE(decoded == frame);
 }
 
-TEST(MetaCodec, EmptyFrame) { expect_round_trip({}); }
+TEST(MetaCodec, EmptyFrame) {
+  expect_round_trip({});
+}
 
 TEST(MetaCodec, RandomFramesOverTheWholeRangeOfEveryField) {
   std::mt19937 random(20260101);
@@ -119,7 +122,10 @@ TEST(MetaCodec, TestVectorOfTheSpecification) {
     hex += "0123456789abcdef"[b >> 4];
     hex += "0123456789abcdef"[b & 15];
   }
-  EXPECT_EQ(hex, "54534d4601000000070000520808000400c18302144850001ff80000000000001000000000000000080100000000000003fe00000000000005ff900400000000000020a887f82404a0afc05019819f03032c1105c45fff05c7c1fff030337c2381b8");
+  EXPECT_EQ(
+      hex,
+      "54534d4601000000070000520808000400c18302144850001ff80000000000001000000000000000080100000000000003fe00"
+      "000000000005ff900400000000000020a887f82404a0afc05019819f03032c1105c45fff05c7c1fff030337c2381b8");
   expect_round_trip(f);
 }
 

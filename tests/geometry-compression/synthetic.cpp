@@ -9,10 +9,14 @@ namespace {
 
 using Random = std::mt19937;
 
-uint32_t below(Random& random, uint32_t end) { return std::uniform_int_distribution<uint32_t>(0, end - 1)(random); }
+uint32_t below(Random& random, uint32_t end) {
+  return std::uniform_int_distribution<uint32_t>(0, end - 1)(random);
+}
 
 // Magnitudes of every order are equally likely.
-uint32_t any_u32(Random& random) { return static_cast<uint32_t>(random() >> below(random, 32)); }
+uint32_t any_u32(Random& random) {
+  return static_cast<uint32_t>(random() >> below(random, 32));
+}
 int32_t any_coordinate(Random& random) {
   const auto magnitude = static_cast<int32_t>((random() & 0x3fffffff) >> below(random, 30));
   return below(random, 2) ? magnitude : -magnitude;
@@ -59,7 +63,8 @@ NewPatch any_patch(Random& random, const NewPatch& previous) {
   p.object = below(random, 4) ? previous.object : any_u32(random);
   p.triangles = static_cast<uint8_t>(1 + below(random, 3));
   for (int corner = 0; corner < p.triangles + 2; ++corner)
-    p.vertices[corner] = below(random, 2) ? any_u32(random) : previous.vertices[below(random, 5)] + below(random, 3);
+    p.vertices[corner] =
+        below(random, 2) ? any_u32(random) : previous.vertices[below(random, 5)] + below(random, 3);
   return p;
 }
 
@@ -136,7 +141,8 @@ std::array<int32_t, 3> torus_point(uint32_t i, uint32_t j, uint32_t side) {
 
 class TorusBuilder {
  public:
-  TorusBuilder(MetaFrame& frame, Random& random, uint32_t side) : frame_(frame), random_(random), side_(side) {}
+  TorusBuilder(MetaFrame& frame, Random& random, uint32_t side)
+      : frame_(frame), random_(random), side_(side) {}
 
   void add_pair(uint32_t i, uint32_t j) {
     const uint32_t a = vertex(i, j), b = vertex(i + 1, j), c = vertex(i, j + 1), d = vertex(i + 1, j + 1);

@@ -65,8 +65,7 @@ void SceneBuilder::add_face(scene::Geometry& g, const mat3& axes, uint32_t cuts)
     for (uint32_t x = 0; x < cuts; ++x) {
       const uint32_t a = first + y * (cuts + 1) + x, b = a + 1, c = a + cuts + 1, d = c + 1;
       g.patches.push_back({g.triangle_count(), 2});
-      // Counter-clockwise in block coordinates whose v runs down: (0,0) (0,1) (1,0) would be; the corners are named
-      // (0,0) (1,0) (0,1), so u runs down and v to the right.
+      // Counter-clockwise; the block's u axis runs from a to c.
       for (const uint32_t i : {a, c, b, d, b, c}) g.indices.push_back(i);
     }
   }

@@ -97,13 +97,21 @@ TEST_P(BothPaths, MaskedBlocksCarryCoverageInTheirSecondHalf) {
       const uint8_t* grey = r.atlas.at(16 + i, j);
       EXPECT_EQ(grey[0], grey[1]);
       EXPECT_EQ(grey[0], grey[2]);
-      if (i < 7) EXPECT_LT(grey[0], 20);
-      if (i > 8) EXPECT_GT(grey[0], 235);
+      if (i < 7) {
+        EXPECT_LT(grey[0], 20);
+      }
+      if (i > 8) {
+        EXPECT_GT(grey[0], 235);
+      }
     }
   for (uint32_t j = 0; j < 8; ++j)
     for (uint32_t i = 0; i < 16; ++i) {
-      if (i < 7) EXPECT_LT(r.atlas.at(32 + i, 8 + j)[0], 20);
-      if (i > 8) EXPECT_GT(r.atlas.at(32 + i, 8 + j)[0], 235);
+      if (i < 7) {
+        EXPECT_LT(r.atlas.at(32 + i, 8 + j)[0], 20);
+      }
+      if (i > 8) {
+        EXPECT_GT(r.atlas.at(32 + i, 8 + j)[0], 235);
+      }
     }
 }
 
@@ -116,7 +124,9 @@ TEST_P(BothPaths, UnusedTexelsKeepMidGrey) {
     for (uint32_t x = 0; x < 128; ++x) {
       const bool used = x >= 4 && x < 8 && y >= 4 && y < 8;
       EXPECT_EQ(r.atlas.at(x, y)[3], used ? 255 : 0);
-      if (!used) EXPECT_NEAR(r.atlas.at(x, y)[1], 128, 1);
+      if (!used) {
+        EXPECT_NEAR(r.atlas.at(x, y)[1], 128, 1);
+      }
     }
 }
 

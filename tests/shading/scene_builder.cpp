@@ -107,6 +107,7 @@ scene::Texture wavy_texture(uint32_t side, bool half_cut) {
   scene::Texture t;
   t.width = t.height = side;
   t.srgb = true;
+  t.wrap_u = t.wrap_v = scene::WrapMode::clamp_to_edge;
   t.rgba.resize(size_t{4} * side * side);
   const double turn = 2 * std::numbers::pi / side;
   for (uint32_t y = 0; y < side; ++y)

@@ -12,7 +12,9 @@ std::shared_ptr<gpu::Device> shared_device;
 class DeviceEnvironment : public testing::Environment {
  public:
   void TearDown() override {
-    if (shared_device) EXPECT_EQ(shared_device->validation_messages(), 0u);
+    if (shared_device) {
+      EXPECT_EQ(shared_device->validation_messages(), 0u);
+    }
     shared_device.reset();
   }
 };

@@ -1,0 +1,307 @@
+#include "bench/loopback.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/camera_path.h"
+#include "base/log.h"
+#include "bench/coverage_meter.h"
+#include "bench/picture_streamer.h"
+#include "bench/shading_streamer.h"
+#include "bench/stream_simulation.h"
+#include "bench/truth_source.h"
+#include "pvs/visibility.h"
+#include "scene/gltf.h"
+#include "scene/procedural.h"
+
+namespace tessera::bench {
+namespace {
+
+double ms_since(TimeNs start) {
+  return to_ms(SteadyClock().now() - start);
+}
+
+// Means of the error with one cause after another switched off (EVALUATION: split).
+struct SplitMeans {
+  ErrorMean coded, chroma_only, uncoded, fresh, seen;
+  uint64_t frames = 0;
+
+  std::vector<SplitRow> rows() const {
+    std::vector<SplitRow> rows;
+    ImageError before = coded.mean();
+    const auto off = [&](const char* cause, const ErrorMean& without) {
+      const ImageError after = without.mean();
+      rows.push_back({cause, after.mssim, after.psnr, after.mssim - before.mssim});
+      before = after;
+    };
+    off("coding", chroma_only);
+    off("chroma", uncoded);
+    off("staleness", fresh);
+    off("visibility", seen);
+    rows.push_back({"sampling", 1.0, kMaxPsnrDb, 1.0 - before.mssim});
+    return rows;
+  }
+};
+
+// Everything of one run; its methods are the steps of a display frame.
+class Loopback {
+ public:
+  Loopback(const LoopbackSettings& settings, Progress& progress) : settings_(settings), progress_(progress) {}
+
+  StatusOr<LoopbackResult> run();
+
+ private:
+  struct Method {
+    Row row;
+    std::unique_ptr<Streamer> streamer;
+    std::unique_ptr<StreamSimulation> simulation;
+    ErrorMean error;
+    double draw_ms = 0;
+  };
+
+  Status set_up();
+  Status add_baseline(PictureMethod method, const char* note);
+  Status show(Method& method, bool scored, const shading::ReferenceImage& truth, const DisplayMoment& moment,
+              FrameRecord& record);
+  Status score_ours(const shading::ReferenceImage& truth, const DisplayMoment& moment, FrameRecord& record);
+  Status score_split(const shading::ReferenceImage& truth, const DisplayMoment& moment,
+                     const Image8& uncoded_visible);
+  Status frame(uint32_t index);
+  void keep_picture(const char* label, uint32_t index, const Image8& truth, const Image8& shown,
+                    const Comparison& c);
+  void fill_rows();
+
+  uint32_t frame_count() const {
+    return static_cast<uint32_t>(std::lround(settings_.seconds * settings_.fps));
+  }
+
+  LoopbackSettings settings_;
+  Progress& progress_;
+  LoopbackResult result_;
+  std::shared_ptr<gpu::Device> device_;
+  std::shared_ptr<const scene::Scene> scene_;
+  std::optional<CameraPath> path_;
+  std::shared_ptr<server::SharedScene> shared_;
+  std::unique_ptr<TruthSource> truth_;
+  std::optional<pvs::TriangleToPatch> patch_of_;
+
+  std::vector<Method> methods_;  // ours first
+  ShadingStreamer* ours_ = nullptr;
+  CoverageMeter coverage_;
+  SplitMeans split_;
+  double holes_sum_ = 0, server_ms_sum_ = 0;
+  uint64_t scored_ = 0, stale_ = 0, server_frames_ = 0, samples_ = 0;
+  double worst_mssim_ = 2;
+};
+
+Status Loopback::set_up() {
+  TESSERA_ASSIGN_OR_RETURN(device_, gpu::Device::create({.select = settings_.device}));
+  result_.settings = settings_;
+  result_.device = {device_->info().name, device_->info().driver, device_->info().software};
+  TESSERA_ASSIGN_OR_RETURN(scene_, scene::load_scene(settings_.scene));
+  TESSERA_ASSIGN_OR_RETURN(CameraPath path, scene::load_path(settings_.path));
+  path_.emplace(std::move(path));
+  if (scene_->features.alpha_blend)
+    result_.notes.push_back("blended materials are drawn opaque, in the truth too");
+  TESSERA_ASSIGN_OR_RETURN(shared_, server::SharedScene::create(device_, scene_));
+  TESSERA_ASSIGN_OR_RETURN(truth_, TruthSource::create(shared_, settings_.scene, settings_.truth_cache,
+                                                       settings_.truth == Truth::one ? 1 : 4));
+  patch_of_.emplace(*scene_);
+
+  TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<ShadingStreamer> ours,
+                           ShadingStreamer::create(shared_, settings_));
+  ours_ = ours.get();
+  result_.plan = ours_->session().plan().to_string();
+  result_.notes.push_back("encoder: " + ours_->session().encoder());
+  methods_.push_back({.row = {.method = ours->name()}, .streamer = std::move(ours)});
+  if (settings_.wants_baseline("mesh-warp")) {
+    TESSERA_RETURN_IF_ERROR(
+        add_baseline(PictureMethod::mesh_warp, "depth travels uncoded and is not counted"));
+  }
+  if (settings_.wants_baseline("plain-video"))
+    TESSERA_RETURN_IF_ERROR(add_baseline(PictureMethod::plain_video, ""));
+  for (Method& method : methods_) {
+    method.simulation = std::make_unique<StreamSimulation>(*method.streamer, *path_, settings_);
+  }
+  return ours_->meter_coverage(coverage_, [this](TimeNs t) { return methods_[0].simulation->pose_at(t); });
+}
+
+Status Loopback::add_baseline(PictureMethod method, const char* note) {
+  TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<PictureStreamer> streamer,
+                           PictureStreamer::create(method, shared_, *truth_, settings_));
+  methods_.push_back({.row = {.method = streamer->name(), .note = note}, .streamer = std::move(streamer)});
+  return absl::OkStatus();
+}
+
+void Loopback::keep_picture(const char* label, uint32_t index, const Image8& truth, const Image8& shown,
+                            const Comparison& c) {
+  const auto same = [&](const Picture& p) { return p.label == label; };
+  std::erase_if(result_.pictures, same);
+  result_.pictures.push_back({label, index, c.error.mssim, truth, shown, c.ssim});
+}
+
+Status Loopback::show(Method& method, bool scored, const shading::ReferenceImage& truth,
+                      const DisplayMoment& moment, FrameRecord& record) {
+  const TimeNs start = SteadyClock().now();
+  TESSERA_ASSIGN_OR_RETURN(const Image8 shown, method.streamer->draw(moment.view));
+  method.draw_ms += ms_since(start);
+  ++method.row.frames_displayed;
+  if (!moment.fresh) ++method.row.frames_stale;
+  if (!scored) return absl::OkStatus();
+  const Comparison comparison = compare_images(truth.color, shown, truth.triangle_plus_one);
+  method.error.add(comparison.error);
+  record.mssim[method.row.method] = comparison.error.mssim;
+  record.psnr[method.row.method] = comparison.error.psnr;
+  if (method.streamer.get() != ours_) return absl::OkStatus();
+  if (moment.index == 0) keep_picture("first", 0, truth.color, shown, comparison);
+  if (moment.index == frame_count() / 2) keep_picture("middle", moment.index, truth.color, shown, comparison);
+  if (comparison.error.mssim < worst_mssim_) {
+    worst_mssim_ = comparison.error.mssim;
+    keep_picture("worst", moment.index, truth.color, shown, comparison);
+  }
+  return absl::OkStatus();
+}
+
+Status Loopback::score_ours(const shading::ReferenceImage& truth, const DisplayMoment& moment,
+                            FrameRecord& record) {
+  const auto has_triangle = [&](uint32_t triangle) { return ours_->has_patch((*patch_of_)[triangle]); };
+  record.holes = hole_share(truth.triangle_plus_one, truth.covered, has_triangle);
+  holes_sum_ += record.holes;
+  coverage_.add_seen(moment.now_ns, visible_patches(*scene_, truth.triangle_plus_one,
+                                                    truth_->instant().instance_transforms(), moment.view));
+  if (!settings_.split) return absl::OkStatus();
+
+  TESSERA_ASSIGN_OR_RETURN(const Image8 chroma_only, ours_->draw_uncoded_420(moment.view));
+  split_.chroma_only.add(compare_images(truth.color, chroma_only, truth.triangle_plus_one).error);
+  TESSERA_ASSIGN_OR_RETURN(const Image8 uncoded, ours_->draw_uncoded(moment.view));
+  split_.uncoded.add(compare_images(truth.color, uncoded, truth.triangle_plus_one).error);
+  TESSERA_ASSIGN_OR_RETURN(Image8 fresh, ours_->draw_fresh(moment.view, truth_->instant()));
+  split_.fresh.add(compare_images(truth.color, fresh, truth.triangle_plus_one).error);
+  // Visibility off: what the client could not know is filled in from the truth.
+  for (size_t i = 0; i < truth.triangle_plus_one.size(); ++i) {
+    const uint32_t id = truth.triangle_plus_one[i];
+    if (id != 0 && !has_triangle(id - 1)) std::copy_n(&truth.color.rgba[4 * i], 4, &fresh.rgba[4 * i]);
+  }
+  split_.seen.add(compare_images(truth.color, fresh, truth.triangle_plus_one).error);
+  return absl::OkStatus();
+}
+
+Status Loopback::frame(uint32_t index) {
+  const bool scored = index % settings_.score_every == 0;
+  FrameRecord record;
+  shading::ReferenceImage truth;
+  for (Method& method : methods_) {
+    const uint64_t rendered_before = method.simulation->frames_rendered();
+    TESSERA_ASSIGN_OR_RETURN(const DisplayMoment moment, method.simulation->next_display());
+    const bool is_ours = method.streamer.get() == ours_;
+    if (is_ours) {
+      if (method.simulation->frames_rendered() != rendered_before) {
+        const server::FrameStats& stats = ours_->last_stats();
+        server_ms_sum_ += stats.times.total_ms();
+        samples_ += stats.gather.samples;
+        ++server_frames_;
+      }
+      const FrameTimeline& shown = method.simulation->shown_frames().back();
+      record.time_ns = from_seconds(index / settings_.fps);
+      record.frame = moment.frame;
+      record.age_ms = to_ms(moment.now_ns - shown.pose_sent);
+      if (moment.fresh) {
+        record.atlas_bytes = shown.atlas_bytes;
+        record.meta_bytes = shown.meta_bytes;
+      }
+      if (scored) {
+        TESSERA_ASSIGN_OR_RETURN(truth, truth_->truth(moment.view, moment.path_time_ns));
+        ++scored_;
+      }
+    }
+    TESSERA_RETURN_IF_ERROR(show(method, scored, truth, moment, record));
+    if (is_ours && scored) TESSERA_RETURN_IF_ERROR(score_ours(truth, moment, record));
+  }
+  result_.frames.push_back(std::move(record));
+  return absl::OkStatus();
+}
+
+void Loopback::fill_rows() {
+  for (Method& method : methods_) {
+    Row& row = method.row;
+    const StreamSimulation& simulation = *method.simulation;
+    row.error = method.error.mean();
+    row.mbps_atlas = simulation.megabits_per_second(Channel::atlas);
+    row.mbps_meta = simulation.megabits_per_second(Channel::meta);
+    row.mbps_total = row.mbps_atlas + row.mbps_meta;
+    row.client_ms = method.draw_ms / std::max<double>(1, static_cast<double>(row.frames_displayed));
+
+    std::map<std::string, std::vector<double>> durations;
+    std::vector<double> end_to_end;
+    double tiling = 0;
+    FrameNumber newest = 0;
+    for (const FrameTimeline& t : simulation.shown_frames()) {
+      const TimeNs arrived = std::max(t.atlas_delivered, t.meta_delivered);
+      // Decoding and drawing take no virtual time.
+      const std::pair<const char*, DurationNs> parts[] = {{"pose_uplink", t.pose_received - t.pose_sent},
+                                                          {"server_wait", t.render_start - t.pose_received},
+                                                          {"server_render", t.render_end - t.render_start},
+                                                          {"downlink", arrived - t.render_end},
+                                                          {"client_wait", t.shown - arrived}};
+      DurationNs sum = 0;
+      for (const auto& [name, duration] : parts) {
+        durations[name].push_back(to_ms(duration));
+        sum += duration;
+      }
+      end_to_end.push_back(to_ms(t.shown - t.pose_sent));
+      tiling = std::max(tiling, std::abs(to_ms(t.shown - t.pose_sent - sum)));
+      newest = t.number;
+    }
+    for (auto& [name, values] : durations) row.durations_ms[name] = percentiles(std::move(values));
+    row.end_to_end_ms = percentiles(std::move(end_to_end));
+    row.tiling_error_ms_max = tiling;
+    row.frames_lost = newest + 1 - simulation.shown_frames().size();
+  }
+
+  Row& ours = methods_[0].row;
+  const CoverageMeter::Result coverage = coverage_.result();
+  ours.holes = holes_sum_ / std::max<double>(1, static_cast<double>(scored_));
+  ours.coverage = coverage.coverage;
+  ours.coverage_without_prediction = coverage.coverage_without_prediction;
+  ours.overestimation = coverage.overestimation;
+  ours.violations = ours_->violations();
+  ours.server_ms = server_ms_sum_ / std::max<double>(1, static_cast<double>(server_frames_));
+  ours.samples_shaded = samples_ / std::max<uint64_t>(1, server_frames_);
+  ours.peak_rss_mib = peak_rss_mib();
+  ours.device_mib = static_cast<double>(device_->memory_peak()) / (1 << 20);
+  for (Method& method : methods_) result_.rows.push_back(method.row);
+  if (settings_.split) {
+    split_.coded = methods_[0].error;
+    result_.split = split_.rows();
+  }
+}
+
+StatusOr<LoopbackResult> Loopback::run() {
+  TESSERA_RETURN_IF_ERROR(set_up());
+  if (frame_count() == 0) return absl::InvalidArgumentError("--seconds and --fps give no display frame");
+  // The first display frame brings the first server frames with it and is timed for the estimate.
+  const TimeNs start = SteadyClock().now();
+  TESSERA_RETURN_IF_ERROR(frame(0));
+  TESSERA_RETURN_IF_ERROR(frame_count() > 1 ? frame(1) : absl::OkStatus());
+  progress_.estimate(1e-3 * ms_since(start) / 2 * (frame_count() - 2));
+  if (settings_.estimate_only) {
+    result_.frames.clear();
+    result_.pictures.clear();
+    return std::move(result_);
+  }
+  progress_.begin("display frames", frame_count());
+  for (uint32_t i = 2; i < frame_count(); ++i) {
+    TESSERA_RETURN_IF_ERROR(frame(i));
+    progress_.advance();
+  }
+  fill_rows();
+  return std::move(result_);
+}
+
+}  // namespace
+
+StatusOr<LoopbackResult> run_loopback(const LoopbackSettings& settings, Progress& progress) {
+  return Loopback(settings, progress).run();
+}
+
+}  // namespace tessera::bench
