@@ -1,6 +1,7 @@
 #include "bench/picture_streamer.h"
 
 #include <map>
+#include <utility>
 
 #include "bench/mesh_warp.h"
 #include "codec/video_decoder.h"
@@ -30,6 +31,7 @@ struct PictureStreamer::Impl {
 
   std::map<FrameNumber, SourcePicture> sources;
   bool first = true;
+  bool broken = false;
   std::optional<FrameNumber> arrived;
   Image8 picture;  // of `arrived`
 
@@ -76,7 +78,7 @@ StatusOr<std::vector<Packet>> PictureStreamer::serve(const ServeRequest& request
   const bool with_depth = impl_->method == PictureMethod::mesh_warp;
   TESSERA_ASSIGN_OR_RETURN(shading::ReferenceImage rendered,
                            impl_->source.render(view, request.scene_time_ns, {.depth = with_depth}));
-  const bool key_frame = std::exchange(impl_->first, false);
+  const bool key_frame = std::exchange(impl_->first, false) || request.key_frame;
   const YuvImage yuv = codec::rgb_to_yuv(rendered.color);
   TESSERA_ASSIGN_OR_RETURN(codec::AccessUnit unit,
                            impl_->encoder->encode(request.number, codec::view_of(yuv),
@@ -88,7 +90,10 @@ StatusOr<std::vector<Packet>> PictureStreamer::serve(const ServeRequest& request
 }
 
 Status PictureStreamer::deliver(Channel, std::span<const uint8_t> bytes) {
-  TESSERA_ASSIGN_OR_RETURN(const codec::DecodedFrame decoded, impl_->decoder->decode(bytes));
+  const StatusOr<codec::DecodedFrame> result = impl_->decoder->decode(bytes);
+  impl_->broken = !result.ok();
+  if (impl_->broken) return absl::OkStatus();  // the old picture stays until a key frame
+  const codec::DecodedFrame& decoded = *result;
   impl_->picture = codec::yuv_to_rgb(decoded.picture);
   impl_->arrived = decoded.frame;
   std::erase_if(impl_->sources, [&](const auto& entry) { return is_newer(decoded.frame, entry.first); });
@@ -96,6 +101,8 @@ Status PictureStreamer::deliver(Channel, std::span<const uint8_t> bytes) {
   const SourcePicture& source = impl_->sources.at(decoded.frame);
   return impl_->warp->set_source(source.view, impl_->picture, source.depth);
 }
+
+bool PictureStreamer::wants_key_frame() const { return impl_->broken; }
 
 std::optional<FrameNumber> PictureStreamer::newest_frame() {
   return impl_->arrived;

@@ -27,7 +27,7 @@ class PictureStreamer final : public Streamer {
   Status deliver(Channel channel, std::span<const uint8_t> bytes) override;
   std::optional<FrameNumber> newest_frame() override;
   StatusOr<Image8> draw(const View& view) override;
-  bool wants_key_frame() const override { return false; }
+  bool wants_key_frame() const override;
 
  private:
   struct Impl;

@@ -28,7 +28,6 @@ void for_each_option(Settings& s, Visitor&& visit) {
   visit("Server", "codec", s.codec, "atlas coding");
   visit("Server", "bitrate-mbps", s.bitrate_mbps, "atlas and meta together");
   visit("Server", "pvs", s.pvs, "prediction of the potentially visible set");
-  visit("Server", "sessions", s.sessions, "clients at once");
   visit("Server", "device", s.device, "Vulkan device: cpu, an index, or part of its name");
   visit("Network", "delay-ms", s.delay_ms, "one way");
   visit("Network", "jitter-ms", s.jitter_ms, "uniform, plus or minus");
@@ -164,7 +163,6 @@ void add_checks(CLI::App& app) {
   check("--fov-y", CLI::Range(1.0, 179.0));
   check("--layout", CLI::IsMember({"blocks"}));
   check("--bitrate-mbps", CLI::Range(0.01, 10000.0));
-  check("--sessions", CLI::Range(1, 64));
   check("--delay-ms", CLI::Range(0.0, 10000.0));
   check("--jitter-ms", CLI::Range(0.0, 10000.0));
   check("--loss", CLI::Range(0.0, 0.5));

@@ -46,7 +46,6 @@ struct LoopbackSettings {
   Codec codec = Codec::h264;
   double bitrate_mbps = 20;  // atlas and meta together
   Prediction pvs = Prediction::linear;
-  uint32_t sessions = 1;
   std::string device = "cpu";
   // Network
   double delay_ms = 50;  // one way

@@ -174,7 +174,10 @@ StatusOr<std::vector<Packet>> ShadingStreamer::serve(const ServeRequest& request
 }
 
 Status ShadingStreamer::deliver(Channel channel, std::span<const uint8_t> bytes) {
-  return channel == Channel::atlas ? impl_->core->on_atlas(bytes) : impl_->core->on_meta(bytes);
+  if (channel == Channel::meta) return impl_->core->on_meta(bytes);
+  // Late or missing pictures are part of a network: the core counts them and asks for a key frame.
+  if (const Status status = impl_->core->on_atlas(bytes); !status.ok()) spdlog::debug("client: {}", status.ToString());
+  return absl::OkStatus();
 }
 
 std::optional<FrameNumber> ShadingStreamer::newest_frame() {

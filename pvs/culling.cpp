@@ -18,7 +18,17 @@ constexpr uint32_t kPyramidTile = 2;
 constexpr uint32_t kPyramidGroup = 8;
 
 // Set 2 of pvs/shaders/visibility.glsl.
-enum CullBinding : uint32_t { kInstanceBuckets, kWasVisible, kSurvivors, kGroupCounts, kDraws, kCounts, kPyramid, kDepth, kBounds };
+enum CullBinding : uint32_t {
+  kInstanceBuckets,
+  kWasVisible,
+  kSurvivors,
+  kGroupCounts,
+  kDraws,
+  kCounts,
+  kPyramid,
+  kDepth,
+  kBounds
+};
 
 // Push constants of cull.comp.
 struct CullPush {
@@ -43,7 +53,9 @@ struct LevelPush {
   uint32_t from_start, to_start;
 };
 
-constexpr uint32_t groups(uint32_t items, uint32_t size) { return (items + size - 1) / size; }
+constexpr uint32_t groups(uint32_t items, uint32_t size) {
+  return (items + size - 1) / size;
+}
 
 // Boxes in geometry space: they fit flat and long meshlets far better than their spheres.
 struct MeshletBounds {
@@ -56,14 +68,17 @@ std::vector<MeshletBounds> meshlet_bounds(const scene::Scene& scene) {
   for (const scene::Geometry& g : scene.geometries) {
     for (const scene::Meshlet& m : g.meshlets) {
       Aabb box;
-      for (uint32_t i = 0; i < 3 * m.triangle_count; ++i) box.add(g.vertices[g.indices[3 * m.first_triangle + i]].position);
+      for (uint32_t i = 0; i < 3 * m.triangle_count; ++i)
+        box.add(g.vertices[g.indices[3 * m.first_triangle + i]].position);
       out.push_back({vec4(box.min, 0), vec4(box.max, 0)});
     }
   }
   return out;
 }
 
-uvec2 level_0_size(uint32_t width, uint32_t height) { return {groups(width, kPyramidTile), groups(height, kPyramidTile)}; }
+uvec2 level_0_size(uint32_t width, uint32_t height) {
+  return {groups(width, kPyramidTile), groups(height, kPyramidTile)};
+}
 
 uint64_t pyramid_texels(uint32_t width, uint32_t height) {
   uvec2 size = level_0_size(width, height);
@@ -87,7 +102,8 @@ StatusOr<MeshletCulling> MeshletCulling::create(gpu::Device& device, const scene
 }
 
 Status MeshletCulling::create_buffers() {
-  const uint64_t meshlets = std::max(1u, meshlets_), instances = std::max<size_t>(1, scene_->scene().instances.size());
+  const uint64_t meshlets = std::max(1u, meshlets_),
+                 instances = std::max<size_t>(1, scene_->scene().instances.size());
   const auto make = [&](gpu::Buffer& buffer, uint64_t words, gpu::Memory memory, const char* name) -> Status {
     TESSERA_ASSIGN_OR_RETURN(buffer, gpu::Buffer::create(*device_, words * sizeof(uint32_t), memory, name));
     return absl::OkStatus();
@@ -95,13 +111,15 @@ Status MeshletCulling::create_buffers() {
   TESSERA_RETURN_IF_ERROR(make(buckets_, instances, gpu::Memory::upload, "pvs instance buckets"));
   TESSERA_RETURN_IF_ERROR(make(was_visible_, meshlets, gpu::Memory::device, "pvs visible meshlets"));
   TESSERA_RETURN_IF_ERROR(make(survivors_, meshlets, gpu::Memory::device, "pvs surviving meshlets"));
-  TESSERA_RETURN_IF_ERROR(
-      make(group_counts_, uint64_t{kBuckets} * groups(meshlets, kGroupSize), gpu::Memory::device, "pvs group counts"));
+  TESSERA_RETURN_IF_ERROR(make(group_counts_, uint64_t{kBuckets} * groups(meshlets, kGroupSize),
+                               gpu::Memory::device, "pvs group counts"));
   TESSERA_RETURN_IF_ERROR(make(draws_, 5 * meshlets, gpu::Memory::device, "pvs draws"));
-  TESSERA_RETURN_IF_ERROR(make(counts_, sizeof(CullCounts) / sizeof(uint32_t), gpu::Memory::device, "pvs draw counts"));
+  TESSERA_RETURN_IF_ERROR(
+      make(counts_, sizeof(CullCounts) / sizeof(uint32_t), gpu::Memory::device, "pvs draw counts"));
   std::vector<MeshletBounds> bounds = meshlet_bounds(scene_->scene());
   if (bounds.empty()) bounds.emplace_back();  // a binding cannot be empty
-  TESSERA_ASSIGN_OR_RETURN(bounds_, gpu::Buffer::create_filled(*device_, std::as_bytes(std::span(bounds)), "pvs meshlet bounds"));
+  TESSERA_ASSIGN_OR_RETURN(
+      bounds_, gpu::Buffer::create_filled(*device_, std::as_bytes(std::span(bounds)), "pvs meshlet bounds"));
   TESSERA_ASSIGN_OR_RETURN(sampler_, gpu::Sampler::create(*device_, {.wrap_u = gpu::Wrap::clamp_to_edge,
                                                                      .wrap_v = gpu::Wrap::clamp_to_edge,
                                                                      .filter = gpu::Filter::nearest,
@@ -111,7 +129,8 @@ Status MeshletCulling::create_buffers() {
 
 Status MeshletCulling::create_pipelines() {
   std::vector<gpu::Binding> bindings;
-  for (uint32_t b = kInstanceBuckets; b <= kPyramid; ++b) bindings.push_back({b, gpu::BindingKind::storage_buffer});
+  for (uint32_t b = kInstanceBuckets; b <= kPyramid; ++b)
+    bindings.push_back({b, gpu::BindingKind::storage_buffer});
   bindings.push_back({kDepth, gpu::BindingKind::sampled_image});
   bindings.push_back({kBounds, gpu::BindingKind::storage_buffer});
   TESSERA_ASSIGN_OR_RETURN(layout_, gpu::BindLayout::create(*device_, bindings));
@@ -124,13 +143,15 @@ Status MeshletCulling::create_pipelines() {
   group_.set(kCounts, counts_);
   group_.set(kBounds, bounds_);
 
-  const auto make = [&](gpu::ComputePipeline& pipeline, const char* name, gpu::Spirv shader, uint32_t push) -> Status {
-    TESSERA_ASSIGN_OR_RETURN(pipeline,
-                             gpu::ComputePipeline::create(*device_, {.name = name,
-                                                                     .shader = shader,
-                                                                     .layouts = {&scene_->layout(), &scene_->instant_layout(), &layout_},
-                                                                     .push_bytes = push,
-                                                                     .constants = scene_->constants()}));
+  const auto make = [&](gpu::ComputePipeline& pipeline, const char* name, gpu::Spirv shader,
+                        uint32_t push) -> Status {
+    TESSERA_ASSIGN_OR_RETURN(
+        pipeline, gpu::ComputePipeline::create(
+                      *device_, {.name = name,
+                                 .shader = shader,
+                                 .layouts = {&scene_->layout(), &scene_->instant_layout(), &layout_},
+                                 .push_bytes = push,
+                                 .constants = scene_->constants()}));
     return absl::OkStatus();
   };
   TESSERA_RETURN_IF_ERROR(make(cull_, "pvs cull", cull_comp, sizeof(CullPush)));
@@ -141,7 +162,8 @@ Status MeshletCulling::create_pipelines() {
 Status MeshletCulling::set_depth(const gpu::Image& depth) {
   const uint64_t bytes = sizeof(float) * pyramid_texels(depth.width(), depth.height());
   if (bytes > pyramid_.size()) {
-    TESSERA_ASSIGN_OR_RETURN(pyramid_, gpu::Buffer::create(*device_, bytes, gpu::Memory::device, "pvs depth pyramid"));
+    TESSERA_ASSIGN_OR_RETURN(pyramid_,
+                             gpu::Buffer::create(*device_, bytes, gpu::Memory::device, "pvs depth pyramid"));
     group_.set(kPyramid, pyramid_);
   }
   group_.set(kDepth, depth, sampler_);
@@ -155,8 +177,8 @@ void MeshletCulling::set_buckets(const BucketTable& buckets) {
   }
 }
 
-void MeshletCulling::record_cull(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view,
-                                 CullPhase phase) const {
+void MeshletCulling::record_cull(gpu::Commands& commands, const scene::SceneInstant& instant,
+                                 const View& view, CullPhase phase) const {
   const mat4 to_camera = view_matrix(view.pose, instant.origin());
   CullPush push{.fov = vec4(view.fov.left, view.fov.right, view.fov.down, view.fov.up),
                 .near_m = view.near_m,
@@ -183,7 +205,8 @@ void MeshletCulling::record_cull(gpu::Commands& commands, const scene::SceneInst
   commands.barrier();
 }
 
-void MeshletCulling::record_pyramid(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view) const {
+void MeshletCulling::record_pyramid(gpu::Commands& commands, const scene::SceneInstant& instant,
+                                    const View& view) const {
   commands.bind(pyramid_pass_, {&scene_->group(), &instant.group(), &group_});
   LevelPush level{.from_size = {view.width, view.height},
                   .to_size = level_0_size(view.width, view.height),

@@ -1,6 +1,7 @@
-// Meshlet culling on the device: which meshlets of the scene a view has to draw, as lists of draw commands by bucket.
-// Two phases a view: first what the last view saw; then, with the depth of that in a pyramid, whatever else it does not
-// hide. Each phase leaves its lists in draws() and counts(), for draw calls right after it.
+// Meshlet culling on the device: which meshlets of the scene a view has to draw, as lists of draw commands by
+// bucket. Two phases a view: first what the last view saw; then, with the depth of that in a pyramid,
+// whatever else it does not hide. Each phase leaves its lists in draws() and counts(), for draw calls right
+// after it.
 #pragma once
 
 #include <memory>
@@ -27,9 +28,11 @@ static_assert(sizeof(CullCounts) == 32);
 
 class MeshletCulling {
  public:
-  static StatusOr<MeshletCulling> create(gpu::Device& device, const scene::GpuScene& scene, const VisibilitySettings& settings);
+  static StatusOr<MeshletCulling> create(gpu::Device& device, const scene::GpuScene& scene,
+                                         const VisibilitySettings& settings);
 
-  // The depth buffer that record_pyramid() reads. Again whenever it is replaced. No device work may be under way.
+  // The depth buffer that record_pyramid() reads. Again whenever it is replaced. No device work may be under
+  // way.
   Status set_depth(const gpu::Image& depth);
   // No device work may be under way.
   void set_buckets(const BucketTable& buckets);
@@ -37,7 +40,8 @@ class MeshletCulling {
   // True if views are drawn in two phases.
   bool has_second_phase() const { return settings_.occlusion_culling; }
   // Recorders leave a barrier behind themselves.
-  void record_cull(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view, CullPhase phase) const;
+  void record_cull(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view,
+                   CullPhase phase) const;
   void record_pyramid(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view) const;
 
   const gpu::Buffer& draws() const { return draws_; }

@@ -13,10 +13,14 @@ dvec3 scaled_to_one(const dvec3& v) {
   return largest > 0 ? v / largest : v;
 }
 
-// Thesis eq. 3.1. acos of a dot product loses all digits for small angles; this does not. 0 where the eye is at a corner.
-double angle_between(const dvec3& a, const dvec3& b) { return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)); }
+// Thesis eq. 3.1. acos of a dot product loses all digits for small angles; this does not. 0 where the eye is
+// at a corner.
+double angle_between(const dvec3& a, const dvec3& b) {
+  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+}
 
-// Heron's formula as ordered by Kahan: exact to rounding for slivers too. 0 where no triangle has these sides.
+// Heron's formula as ordered by Kahan: exact to rounding for slivers too. 0 where no triangle has these
+// sides.
 double area_from_sides(double a, double b, double c) {
   if (a < b) std::swap(a, b);
   if (b < c) std::swap(b, c);
@@ -51,7 +55,8 @@ scene::Footprint footprint(const scene::Geometry& geometry, const scene::Patch& 
     area_sr += area_from_sides(side[0], side[1], side[2]);
   }
   const double scale = pixels_per_radian;
-  return {static_cast<float>(scale * u_rad), static_cast<float>(scale * v_rad), static_cast<float>(scale * scale * area_sr)};
+  return {static_cast<float>(scale * u_rad), static_cast<float>(scale * v_rad),
+          static_cast<float>(scale * scale * area_sr)};
 }
 
 }  // namespace tessera::pvs

@@ -9,9 +9,11 @@ namespace tessera::pvs {
 namespace {
 
 constexpr uint32_t kMaskedConstant = 1;  // kMasked in ids.vert, ids.frag
-constexpr uint32_t kSizeStep = 64;       // views grow and shrink with the margin: targets do not follow each pixel
+constexpr uint32_t kSizeStep = 64;  // views grow and shrink with the margin: targets do not follow each pixel
 
-uint32_t rounded_up(uint32_t size) { return (size + kSizeStep - 1) / kSizeStep * kSizeStep; }
+uint32_t rounded_up(uint32_t size) {
+  return (size + kSizeStep - 1) / kSizeStep * kSizeStep;
+}
 
 }  // namespace
 
@@ -43,9 +45,12 @@ StatusOr<bool> IdPass::reserve(uint32_t width, uint32_t height) {
   width = rounded_up(std::max(width, ids_.width()));
   height = rounded_up(std::max(height, ids_.height()));
   TESSERA_ASSIGN_OR_RETURN(
-      ids_, gpu::Image::create(*device_, {.width = width, .height = height, .format = gpu::Format::r32_uint}, "pvs ids"));
+      ids_, gpu::Image::create(*device_, {.width = width, .height = height, .format = gpu::Format::r32_uint},
+                               "pvs ids"));
   TESSERA_ASSIGN_OR_RETURN(
-      depth_, gpu::Image::create(*device_, {.width = width, .height = height, .format = gpu::Format::depth32_float}, "pvs depth"));
+      depth_,
+      gpu::Image::create(*device_, {.width = width, .height = height, .format = gpu::Format::depth32_float},
+                         "pvs depth"));
   return true;
 }
 
@@ -74,7 +79,8 @@ void IdPass::record(gpu::Commands& commands, const scene::SceneInstant& instant,
     if (buckets.meshlets[b] == 0) continue;
     bind(commands, instant, view, kBucketStates[b]);
     commands.draw_indexed_indirect_count(culling.draws(), MeshletCulling::draw_offset(buckets.first_draw[b]),
-                                         culling.counts(), MeshletCulling::count_offset(b), buckets.meshlets[b]);
+                                         culling.counts(), MeshletCulling::count_offset(b),
+                                         buckets.meshlets[b]);
   }
   commands.end_rendering();
   commands.barrier();
@@ -91,8 +97,8 @@ void IdPass::record_all(gpu::Commands& commands, const scene::SceneInstant& inst
     for (size_t i = 0; i < scene.instances.size(); ++i) {
       const uint32_t geometry = scene.instances[i].geometry;
       if (buckets.of_instance[i] == b) {
-        commands.draw_indexed(3 * scene.geometries[geometry].triangle_count(), 1, scene_->first_index(geometry), 0,
-                              first_meshlet);
+        commands.draw_indexed(3 * scene.geometries[geometry].triangle_count(), 1,
+                              scene_->first_index(geometry), 0, first_meshlet);
       }
       first_meshlet += static_cast<uint32_t>(scene.geometries[geometry].meshlets.size());
     }
@@ -101,7 +107,8 @@ void IdPass::record_all(gpu::Commands& commands, const scene::SceneInstant& inst
   commands.barrier();
 }
 
-void IdPass::record_warm_up(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view) const {
+void IdPass::record_warm_up(gpu::Commands& commands, const scene::SceneInstant& instant,
+                            const View& view) const {
   begin(commands, view, true);
   for (const BucketState& state : kBucketStates) {
     if (state.masked && !scene_->scene().features.alpha_mask) continue;

@@ -23,8 +23,8 @@ class IdPass {
   uint64_t id_bytes() const { return uint64_t{sizeof(uint32_t)} * ids_.width() * ids_.height(); }
 
   // The lists that `culling` made last; `clear` starts a new view. Leaves a barrier behind.
-  void record(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view, const BucketTable& buckets,
-              const MeshletCulling& culling, bool clear) const;
+  void record(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view,
+              const BucketTable& buckets, const MeshletCulling& culling, bool clear) const;
   // Everything, instance by instance. Leaves a barrier behind.
   void record_all(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view,
                   const BucketTable& buckets) const;
@@ -35,7 +35,8 @@ class IdPass {
   IdPass() = default;
   const gpu::RasterPipeline& pipeline(bool masked) const { return masked ? masked_ : opaque_; }
   void begin(gpu::Commands& commands, const View& view, bool clear) const;
-  void bind(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view, const BucketState& state) const;
+  void bind(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view,
+            const BucketState& state) const;
 
   gpu::Device* device_ = nullptr;
   const scene::GpuScene* scene_ = nullptr;

@@ -14,7 +14,8 @@ TriangleToPatch::TriangleToPatch(const scene::Scene& scene) {
   }
 }
 
-PatchMarking::PatchMarking(const scene::Scene& scene) : scene_(&scene), patch_of_(scene), marks_(scene.patch_count) {}
+PatchMarking::PatchMarking(const scene::Scene& scene)
+    : scene_(&scene), patch_of_(scene), marks_(scene.patch_count) {}
 
 void PatchMarking::next_stamp() {
   if (++stamp_ == 0) {  // wrapped: old stamps would look new
@@ -32,10 +33,12 @@ void PatchMarking::begin() {
   first_stamp_ = stamp_;
 }
 
-void PatchMarking::see(scene::PatchId patch, const scene::SceneInstant& instant, const dvec3& eye, float pixels_per_radian) {
+void PatchMarking::see(scene::PatchId patch, const scene::SceneInstant& instant, const dvec3& eye,
+                       float pixels_per_radian) {
   const auto owns = [&](uint32_t i) {
     const scene::Instance& instance = scene_->instances[i];
-    return patch >= instance.first_patch && patch - instance.first_patch < scene_->geometries[instance.geometry].patches.size();
+    return patch >= instance.first_patch &&
+           patch - instance.first_patch < scene_->geometries[instance.geometry].patches.size();
   };
   if (!owns(instance_)) instance_ = scene_->instance_of(patch);
   const scene::Instance& instance = scene_->instances[instance_];
@@ -52,7 +55,8 @@ void PatchMarking::see(scene::PatchId patch, const scene::SceneInstant& instant,
   mark.stamp = stamp_;
 }
 
-void PatchMarking::add(const IdRows& rows, const scene::SceneInstant& instant, const dvec3& eye, float pixels_per_radian) {
+void PatchMarking::add(const IdRows& rows, const scene::SceneInstant& instant, const dvec3& eye,
+                       float pixels_per_radian) {
   // Views from one eye point share their footprints.
   if (!has_eye_ || eye != eye_) next_stamp();
   has_eye_ = true;

@@ -1,5 +1,5 @@
-// From id buffers to visible patches, on the CPU: on a software device this beats a compute pass (copy and loop 1.2 ms
-// against 9-20 ms at 1080p), and elsewhere it hides behind the next view.
+// From id buffers to visible patches, on the CPU: on a software device this beats a compute pass (copy and
+// loop 1.2 ms against 9-20 ms at 1080p), and elsewhere it hides behind the next view.
 #pragma once
 
 #include <span>
@@ -31,7 +31,8 @@ class PatchMarking {
 
  private:
   void next_stamp();
-  void see(scene::PatchId patch, const scene::SceneInstant& instant, const dvec3& eye, float pixels_per_radian);
+  void see(scene::PatchId patch, const scene::SceneInstant& instant, const dvec3& eye,
+           float pixels_per_radian);
 
   struct Mark {
     uint32_t stamp = 0;  // the last eye that saw the patch

@@ -15,8 +15,8 @@ constexpr double kMaxSpeedMps = 100;
 constexpr double kMaxAngularSpeed = 20;  // rad/s
 // Share of the predicted rotation by which it may be wrong.
 constexpr double kTurnUncertainty = 0.25;
-// Margins do not push a half angle past this (a pixel's share of the field shrinks with cos²): the views along a fast
-// turn cover what it sweeps.
+// Margins do not push a half angle past this (a pixel's share of the field shrinks with cos²): the views
+// along a fast turn cover what it sweeps.
 constexpr float kMaxHalfAngleRad = 1.2217305f;  // 70 degrees
 constexpr DurationNs kMaxViews = 64;
 
@@ -49,7 +49,8 @@ bool is_continuous(const TimedPose& a, const TimedPose& b) {
          glm::length(rotation_between(a.pose.orientation, b.pose.orientation)) <= kMaxAngularSpeed * seconds;
 }
 
-// The poses, brought to unit quaternions, of the unbroken motion that ends with the newest pose; newest first.
+// The poses, brought to unit quaternions, of the unbroken motion that ends with the newest pose; newest
+// first.
 std::vector<TimedPose> newest_motion(std::span<const TimedPose> history) {
   std::vector<TimedPose> out;
   for (size_t i = history.size(); i-- > 0;) {
@@ -61,7 +62,8 @@ std::vector<TimedPose> newest_motion(std::span<const TimedPose> history) {
   return out;
 }
 
-// Least squares over kFitNs before poses[from], through that pose; at least one pair. Constant motion comes out exactly.
+// Least squares over kFitNs before poses[from], through that pose; at least one pair. Constant motion comes
+// out exactly.
 Motion fit(std::span<const TimedPose> poses, size_t from, size_t* last) {
   Motion sum;
   double weight = 0;
@@ -98,16 +100,49 @@ Prediction predict(std::span<const TimedPose> history, TimeNs now_ns) {
   out.motion = fit(poses, 0, &middle);
   if (middle + 1 < poses.size()) {
     const Motion before = fit(poses, middle, &last);
-    const double between = 0.5 * to_seconds(poses[0].time_ns - poses[last].time_ns);  // the middles of the two fits
+    const double between =
+        0.5 * to_seconds(poses[0].time_ns - poses[last].time_ns);  // the middles of the two fits
     out.turn_change = glm::abs(out.motion.turn - before.turn) / between;
   }
   return out;
 }
 
 // Widens one side of the field by the margin, but not past kMaxHalfAngleRad.
-float allowed(float margin, float half_angle) { return std::clamp(kMaxHalfAngleRad - half_angle, 0.0f, margin); }
+float allowed(float margin, float half_angle) {
+  return std::clamp(kMaxHalfAngleRad - half_angle, 0.0f, margin);
+}
 
-View with_margin(const View& client, const Prediction& prediction, double ahead_s, const PredictionSettings& settings) {
+// One side of the view moves out by whole pixels, at least to `to`: where the client does not move, pixel
+// centres stay where the client has them, so that slivers that its pixels hit are hit here too.
+uint32_t grow_side(float& side, float to, float pixel) {
+  const float pixels = std::max(0.0f, std::ceil(std::abs(to - side) / pixel - 0.01f));
+  side += (to < side ? -pixels : pixels) * pixel;
+  return static_cast<uint32_t>(pixels);
+}
+
+View grown(const View& client, const Fov& to) {
+  const float pixel_x = (client.fov.right - client.fov.left) / static_cast<float>(client.width);
+  const float pixel_y = (client.fov.up - client.fov.down) / static_cast<float>(client.height);
+  View view = client;
+  view.width += grow_side(view.fov.left, to.left, pixel_x) + grow_side(view.fov.right, to.right, pixel_x);
+  view.height += grow_side(view.fov.down, to.down, pixel_y) + grow_side(view.fov.up, to.up, pixel_y);
+  return view;
+}
+
+// Views that follow each other look through different points of their pixels, the first through the centres
+// and the others through the usual samples of 4x multisampling: together they see the slivers that a client's
+// samples hit.
+void shift_samples(View& view, size_t index) {
+  static constexpr float kSamples[5][2] = {
+      {0, 0}, {-.125f, -.375f}, {.375f, -.125f}, {-.375f, .125f}, {.125f, .375f}};
+  const float* sample = kSamples[index % 5];
+  const float x = sample[0] * (view.fov.right - view.fov.left) / static_cast<float>(view.width);
+  const float y = sample[1] * (view.fov.up - view.fov.down) / static_cast<float>(view.height);
+  view.fov = {view.fov.left + x, view.fov.right + x, view.fov.down - y, view.fov.up - y};
+}
+
+View with_margin(const View& client, const Prediction& prediction, double ahead_s,
+                 const PredictionSettings& settings) {
   const float half_width = 0.5f * client.fov.width_rad(), half_height = 0.5f * client.fov.height_rad();
   const dvec3 error = kTurnUncertainty * glm::abs(prediction.motion.turn) * ahead_s +
                       0.5 * prediction.turn_change * ahead_s * ahead_s;
@@ -118,22 +153,18 @@ View with_margin(const View& client, const Prediction& prediction, double ahead_
   const float margin_x = std::clamp(static_cast<float>(x), 0.0f, max_margin);
   const float margin_y = std::clamp(static_cast<float>(y), 0.0f, max_margin);
 
-  const float widest_x = std::max(std::abs(std::atan(client.fov.left)), std::abs(std::atan(client.fov.right)));
+  const float widest_x =
+      std::max(std::abs(std::atan(client.fov.left)), std::abs(std::atan(client.fov.right)));
   const float widest_y = std::max(std::abs(std::atan(client.fov.down)), std::abs(std::atan(client.fov.up)));
-  View view = client;
-  view.fov = client.fov.widened(allowed(margin_x, widest_x), allowed(margin_y, widest_y));
-  const float grow_x = (view.fov.right - view.fov.left) / (client.fov.right - client.fov.left);
-  const float grow_y = (view.fov.up - view.fov.down) / (client.fov.up - client.fov.down);
-  // Less a little, so that a view without margin keeps its size.
-  view.width = static_cast<uint32_t>(std::ceil(static_cast<float>(client.width) * grow_x - 0.01f));
-  view.height = static_cast<uint32_t>(std::ceil(static_cast<float>(client.height) * grow_y - 0.01f));
-  return view;
+  return grown(client, client.fov.widened(allowed(margin_x, widest_x), allowed(margin_y, widest_y)));
 }
 
-View view_at(const View& client, const Prediction& prediction, double ahead_s, const PredictionSettings& settings) {
+View view_at(const View& client, const Prediction& prediction, double ahead_s,
+             const PredictionSettings& settings) {
   View view = with_margin(client, prediction, ahead_s, settings);
   view.pose.position = prediction.newest.pose.position + prediction.motion.velocity * ahead_s;
-  view.pose.orientation = glm::normalize(prediction.newest.pose.orientation * rotation_by(prediction.motion.turn * ahead_s));
+  view.pose.orientation =
+      glm::normalize(prediction.newest.pose.orientation * rotation_by(prediction.motion.turn * ahead_s));
   return view;
 }
 
@@ -158,13 +189,17 @@ std::vector<View> predict_views(std::span<const TimedPose> history, TimeNs now_n
     return {view};
   }
   const Prediction prediction = predict(history, now_ns);
-  // A pose from before `now_ns` (it travelled) is extrapolated from its own time; a clock that jumped back adds nothing.
+  // A pose from before `now_ns` (it travelled) is extrapolated from its own time; a clock that jumped back
+  // adds nothing.
   const DurationNs age = std::clamp<DurationNs>(now_ns - prediction.newest.time_ns, 0, kMaxGapNs);
-  std::vector<View> views{view_at(client_view, prediction, 0, settings)};
-  if (age > 0 && 2 * age > settings.step_ns) views.push_back(view_at(client_view, prediction, to_seconds(age), settings));
-  for (const DurationNs t : steps(settings)) {
-    views.push_back(view_at(client_view, prediction, to_seconds(age + t), settings));
-  }
+  std::vector<View> views;
+  const auto add = [&](DurationNs ahead) {
+    views.push_back(view_at(client_view, prediction, to_seconds(ahead), settings));
+    shift_samples(views.back(), views.size() - 1);
+  };
+  add(0);
+  if (age > 0 && 2 * age > settings.step_ns) add(age);
+  for (const DurationNs t : steps(settings)) add(age + t);
   return views;
 }
 

@@ -1,4 +1,5 @@
-// Future views from past poses (thesis 7.1.1): where the client may look from until the next frame replaces this one.
+// Future views from past poses (thesis 7.1.1): where the client may look from until the next frame replaces
+// this one.
 #pragma once
 
 #include <span>
@@ -9,23 +10,25 @@
 namespace tessera::pvs {
 
 enum class PredictionMode {
-  none,       // the newest pose only, for its moment
-  linear,     // linear extrapolation of the last poses' motion
+  none,    // the newest pose only, for its moment
+  linear,  // linear extrapolation of the last poses' motion
 };
 
 struct PredictionSettings {
   PredictionMode mode = PredictionMode::linear;
-  DurationNs horizon_ns = 0;              // one round trip + one server period: how long the result must last
-  DurationNs step_ns = 33'333'333;        // time between predicted views
-  float base_margin = 0.2f;               // field of view grows by this share at rest (thesis: 20 %)
-  float max_margin_rad = 0.7f;            // per side
+  DurationNs horizon_ns = 0;        // one round trip + one server period: how long the result must last
+  DurationNs step_ns = 33'333'333;  // time between predicted views
+  float base_margin = 0.2f;         // field of view grows by this share at rest (thesis: 20 %)
+  float max_margin_rad = 0.7f;      // per side
 };
 
-// Views for times from `now_ns` to `now_ns + horizon_ns`, first to last, the newest pose's own view first. `history` is
-// ordered by time, newest last, at least one pose; positions extrapolate linearly, orientations by constant angular velocity.
-// Each view's field of view grows (and its resolution with it, so that pixels keep their angle) by a margin from the base
-// margin, the angular speed and the angular acceleration, larger further ahead. Repeated or backward timestamps and gaps
-// longer than 0.5 s count as standing still.
+// Views for times from `now_ns` to `now_ns + horizon_ns`, first to last, the newest pose's own view first.
+// `history` is ordered by time, newest last, at least one pose; positions extrapolate linearly, orientations
+// by constant angular velocity. Each view's field of view grows (and its resolution with it, so that pixels
+// keep their angle) by a margin from the base margin, the angular speed and the angular acceleration, larger
+// further ahead: by whole pixels, and later views are shifted by parts of a pixel, so that together they find
+// slivers that the client's multisampling finds. Repeated or backward timestamps and gaps longer than 0.5 s
+// count as standing still.
 std::vector<View> predict_views(std::span<const TimedPose> history, TimeNs now_ns, const View& client_view,
                                 const PredictionSettings& settings);
 

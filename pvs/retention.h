@@ -1,4 +1,5 @@
-// Patches that left the visible set stay for one round trip, so that a short glance away does not move the atlas.
+// Patches that left the visible set stay for one round trip, so that a short glance away does not move the
+// atlas.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,8 @@ namespace tessera::pvs {
 class Retention {
  public:
   explicit Retention(DurationNs keep_ns) : keep_ns_(keep_ns) {}
-  // Returns `seen` plus the patches last seen at most keep_ns ago (with their last footprint), sorted by patch.
+  // Returns `seen` plus the patches last seen at most keep_ns ago (with their last footprint), sorted by
+  // patch.
   scene::VisiblePatches update(TimeNs now_ns, const scene::VisiblePatches& seen);
 
  private:

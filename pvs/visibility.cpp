@@ -20,14 +20,14 @@ constexpr uint32_t kPhases = 2;
 Status check(const View& view) {
   const Fov& f = view.fov;
   if (view.width == 0 || view.height == 0 || view.width > kMaxSide || view.height > kMaxSide) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("visibility: a view of %dx%d pixels; each side must be 1 to %d", view.width, view.height, kMaxSide));
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "visibility: a view of %dx%d pixels; each side must be 1 to %d", view.width, view.height, kMaxSide));
   }
-  if (!(f.left < f.right && f.down < f.up) || !std::isfinite(f.right - f.left) || !std::isfinite(f.up - f.down) ||
-      !(view.near_m > 0) || !std::isfinite(view.near_m)) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("visibility: a view with tangents left %g, right %g, down %g, up %g and near plane %g m is empty", f.left,
-                        f.right, f.down, f.up, view.near_m));
+  if (!(f.left < f.right && f.down < f.up) || !std::isfinite(f.right - f.left) ||
+      !std::isfinite(f.up - f.down) || !(view.near_m > 0) || !std::isfinite(view.near_m)) {
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "visibility: a view with tangents left %g, right %g, down %g, up %g and near plane %g m is empty",
+        f.left, f.right, f.down, f.up, view.near_m));
   }
   return absl::OkStatus();
 }
@@ -57,7 +57,8 @@ struct Visibility::Impl {
   Status warm_up();
   Status prepare(const scene::SceneInstant& instant, std::span<const View> views);
   void record(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view, size_t index);
-  void record_phase(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view, size_t index, CullPhase phase);
+  void record_phase(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view,
+                    size_t index, CullPhase phase);
   // Leaves the views' ids in `ids`. Views are normalised and checked.
   Status render(const scene::SceneInstant& instant, std::span<const View> views);
   void count(size_t views);
@@ -66,8 +67,8 @@ struct Visibility::Impl {
 
 Status Visibility::Impl::create() {
   if (!(settings.resolution_scale >= 0.25f && settings.resolution_scale <= 4)) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("visibility: resolution scale %g; choose one from 0.25 to 4", settings.resolution_scale));
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "visibility: resolution scale %g; choose one from 0.25 to 4", settings.resolution_scale));
   }
   TESSERA_ASSIGN_OR_RETURN(pass, IdPass::create(device, scene));
   TESSERA_ASSIGN_OR_RETURN(culling, MeshletCulling::create(device, scene, settings));
@@ -77,7 +78,8 @@ Status Visibility::Impl::create() {
 // The first use of a pipeline costs up to 400 ms on the software device.
 Status Visibility::Impl::warm_up() {
   if (scene.instanced_meshlet_count() == 0) return absl::OkStatus();
-  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<scene::SceneInstant> instant, scene::SceneInstant::create(device, scene));
+  TESSERA_ASSIGN_OR_RETURN(const std::unique_ptr<scene::SceneInstant> instant,
+                           scene::SceneInstant::create(device, scene));
   instant->set(0, dvec3(0));
   const View view{.width = 16, .height = 16};
   TESSERA_RETURN_IF_ERROR(prepare(*instant, std::span(&view, 1)));
@@ -99,10 +101,12 @@ Status Visibility::Impl::prepare(const scene::SceneInstant& instant, std::span<c
   TESSERA_ASSIGN_OR_RETURN(const bool is_new, pass->reserve(width, height));
   if (is_new) TESSERA_RETURN_IF_ERROR(culling->set_depth(pass->depth()));
   if (const uint64_t bytes = views.size() * pass->id_bytes(); bytes > ids.size()) {
-    TESSERA_ASSIGN_OR_RETURN(ids, gpu::Buffer::create(device, bytes, gpu::Memory::readback, "pvs ids readback"));
+    TESSERA_ASSIGN_OR_RETURN(ids,
+                             gpu::Buffer::create(device, bytes, gpu::Memory::readback, "pvs ids readback"));
   }
   if (const uint64_t bytes = views.size() * kPhases * sizeof(CullCounts); bytes > counts.size()) {
-    TESSERA_ASSIGN_OR_RETURN(counts, gpu::Buffer::create(device, bytes, gpu::Memory::readback, "pvs counts readback"));
+    TESSERA_ASSIGN_OR_RETURN(
+        counts, gpu::Buffer::create(device, bytes, gpu::Memory::readback, "pvs counts readback"));
   }
   // Only an animated scale can turn an instance inside out.
   if (!buckets || scene.scene().features.rigid_animation) {
@@ -112,8 +116,8 @@ Status Visibility::Impl::prepare(const scene::SceneInstant& instant, std::span<c
   return absl::OkStatus();
 }
 
-void Visibility::Impl::record_phase(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view, size_t index,
-                                    CullPhase phase) {
+void Visibility::Impl::record_phase(gpu::Commands& commands, const scene::SceneInstant& instant,
+                                    const View& view, size_t index, CullPhase phase) {
   const bool is_first = phase == CullPhase::first;
   culling->record_cull(commands, instant, view, phase);
   pass->record(commands, instant, view, *buckets, *culling, is_first);
@@ -122,7 +126,8 @@ void Visibility::Impl::record_phase(gpu::Commands& commands, const scene::SceneI
   commands.barrier();
 }
 
-void Visibility::Impl::record(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view, size_t index) {
+void Visibility::Impl::record(gpu::Commands& commands, const scene::SceneInstant& instant, const View& view,
+                              size_t index) {
   if (!culls()) {
     pass->record_all(commands, instant, view, *buckets);
   } else {
@@ -169,7 +174,8 @@ void Visibility::Impl::count(size_t views) {
 
 IdRows Visibility::Impl::rows(const View& view, size_t index) const {
   const size_t pixels = pass->id_bytes() / sizeof(uint32_t);
-  return {ids.as<const uint32_t>().subspan(index * pixels, pixels), view.width, view.height, pass->ids().width()};
+  return {ids.as<const uint32_t>().subspan(index * pixels, pixels), view.width, view.height,
+          pass->ids().width()};
 }
 
 Visibility::Visibility(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -182,8 +188,8 @@ StatusOr<std::unique_ptr<Visibility>> Visibility::create(gpu::Device& device, co
   return std::unique_ptr<Visibility>(new Visibility(std::move(impl)));
 }
 
-StatusOr<scene::VisiblePatches> Visibility::determine(const scene::SceneInstant& instant, std::span<const View> views,
-                                                      const View& client_view) {
+StatusOr<scene::VisiblePatches> Visibility::determine(const scene::SceneInstant& instant,
+                                                      std::span<const View> views, const View& client_view) {
   Impl& s = *impl_;
   std::vector<View> sized(views.begin(), views.end());
   for (View& view : sized) {
@@ -214,11 +220,14 @@ StatusOr<IdBuffer> Visibility::render_ids(const scene::SceneInstant& instant, co
   const IdRows rows = s.rows(safe, 0);
   for (uint32_t y = 0; y < out.height; ++y) {
     const auto row = rows.ids.subspan(size_t{y} * rows.stride, out.width);
-    std::copy(row.begin(), row.end(), out.triangle_plus_one.begin() + static_cast<ptrdiff_t>(size_t{y} * out.width));
+    std::copy(row.begin(), row.end(),
+              out.triangle_plus_one.begin() + static_cast<ptrdiff_t>(size_t{y} * out.width));
   }
   return out;
 }
 
-const VisibilityStats& Visibility::stats() const { return impl_->stats; }
+const VisibilityStats& Visibility::stats() const {
+  return impl_->stats;
+}
 
 }  // namespace tessera::pvs

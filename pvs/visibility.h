@@ -1,5 +1,5 @@
-// The visible set of a few views: meshlet culling (frustum, then two-pass occlusion with a depth pyramid), an id buffer
-// a view, and the union of what they show.
+// The visible set of a few views: meshlet culling (frustum, then two-pass occlusion with a depth pyramid), an
+// id buffer a view, and the union of what they show.
 #pragma once
 
 #include <memory>
@@ -16,8 +16,9 @@ struct VisibilitySettings {
   // Both off: every instance is drawn whole.
   bool frustum_culling = true;
   bool occlusion_culling = true;
-  // Pixels of determine()'s id buffers per pixel of its views, along each side, 0.25 to 4. More finds more of the
-  // triangles that are smaller than a pixel and flicker between views.
+  // Pixels of determine()'s id buffers per pixel of its views, along each side, 0.25 to 4. More finds more of
+  // the triangles that are thinner than a pixel; odd whole numbers keep the views' pixel centres. 1 suffices
+  // for predict_views(), whose views look through different points of their pixels.
   float resolution_scale = 1;
 };
 
@@ -28,22 +29,23 @@ struct VisibilityStats {
   double gpu_ms = 0;
 };
 
-// An id buffer on the CPU: per pixel the global instanced triangle id + 1 (see Instance::first_triangle), 0 = background.
+// An id buffer on the CPU: per pixel the global instanced triangle id + 1 (see Instance::first_triangle), 0 =
+// background.
 struct IdBuffer {
   uint32_t width = 0, height = 0;
   std::vector<uint32_t> triangle_plus_one;
 };
 
-// Per session: keeps the meshlets that the last frame saw. Alpha-masked texels below the cut-off and back faces of
-// single-sided materials are not drawn, exactly as in the reference renderer and on the client.
+// Per session: keeps the meshlets that the last frame saw. Alpha-masked texels below the cut-off and back
+// faces of single-sided materials are not drawn, exactly as in the reference renderer and on the client.
 class Visibility {
  public:
   static StatusOr<std::unique_ptr<Visibility>> create(gpu::Device& device, const scene::GpuScene& scene,
                                                       const VisibilitySettings& settings);
   ~Visibility();
 
-  // The union of the patches that the views show, with each patch's largest footprint (thesis eq. 3.1) over the views'
-  // eye points. Blocks until done. `instant` must be set.
+  // The union of the patches that the views show, with each patch's largest footprint (thesis eq. 3.1) over
+  // the views' eye points. Blocks until done. `instant` must be set.
   StatusOr<scene::VisiblePatches> determine(const scene::SceneInstant& instant, std::span<const View> views,
                                             const View& client_view);
   // One view's id buffer (for coverage, holes, tests).
@@ -66,8 +68,9 @@ class TriangleToPatch {
   std::vector<scene::PatchId> patch_;
 };
 
-// Footprint of a patch seen from `eye` (thesis eq. 3.1, by atan2 instead of acos; area by the cross product of the
-// angular edges). `transform` = world matrix of its instance. Valid for any finite input, the eye in the patch included.
+// Footprint of a patch seen from `eye` (thesis eq. 3.1, by atan2 instead of acos; area by the cross product
+// of the angular edges). `transform` = world matrix of its instance. Valid for any finite input, the eye in
+// the patch included.
 scene::Footprint footprint(const scene::Geometry& geometry, const scene::Patch& patch, const dmat4& transform,
                            const dvec3& eye, float pixels_per_radian);
 

@@ -29,7 +29,9 @@ dquat to_quat(const dvec4& xyzw) {
   return length > 0 ? q / length : dquat(1, 0, 0, 0);
 }
 
-dvec4 from_quat(const dquat& q) { return dvec4(q.x, q.y, q.z, q.w); }
+dvec4 from_quat(const dquat& q) {
+  return dvec4(q.x, q.y, q.z, q.w);
+}
 
 dvec4 key_value(const AnimationChannel& channel, size_t key) {
   const size_t step = channel.interpolation == Interpolation::cubic_spline ? 3 : 1;
@@ -64,9 +66,15 @@ dvec4 sample(const AnimationChannel& channel, double time_s) {
 void apply(const AnimationChannel& channel, double time_s, Trs& trs) {
   const dvec4 value = sample(channel, time_s);
   switch (channel.path) {
-    case AnimationPath::translation: trs.translation = dvec3(value); break;
-    case AnimationPath::rotation: trs.rotation = to_quat(value); break;
-    case AnimationPath::scale: trs.scale = dvec3(value); break;
+    case AnimationPath::translation:
+      trs.translation = dvec3(value);
+      break;
+    case AnimationPath::rotation:
+      trs.rotation = to_quat(value);
+      break;
+    case AnimationPath::scale:
+      trs.scale = dvec3(value);
+      break;
   }
 }
 
@@ -86,7 +94,8 @@ std::vector<dmat4> Scene::node_transforms(TimeNs time_ns) const {
   for (const AnimationChannel& channel : animations) {
     if (channel.times_s.empty()) continue;
     const Node& node = nodes[channel.node];
-    apply(channel, time_s, posed.try_emplace(channel.node, Trs{node.translation, node.rotation, node.scale}).first->second);
+    apply(channel, time_s,
+          posed.try_emplace(channel.node, Trs{node.translation, node.rotation, node.scale}).first->second);
   }
   std::vector<dmat4> worlds(nodes.size());
   for (uint32_t i = 0; i < nodes.size(); ++i) {

@@ -1,6 +1,7 @@
 // Scene::index_instances(): ids over all instances, and what the scene contains.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "scene/scene.h"
 
@@ -46,11 +47,21 @@ void add_material(const Material& m, Features& f) {
 void add_lights(const std::vector<Light>& lights, Features& f) {
   for (const Light& light : lights) {
     switch (light.type) {
-      case LightType::directional: ++f.directional_lights; break;
-      case LightType::point: ++f.point_lights; break;
-      case LightType::spot: ++f.spot_lights; break;
+      case LightType::directional:
+        ++f.directional_lights;
+        break;
+      case LightType::point:
+        ++f.point_lights;
+        break;
+      case LightType::spot:
+        ++f.spot_lights;
+        break;
     }
   }
+}
+
+float to_float(double x) {
+  return static_cast<float>(std::min<double>(x, std::numeric_limits<float>::max()));
 }
 
 bool has_colors(const Geometry& geometry) {
@@ -85,8 +96,8 @@ void Scene::index_instances() {
   add_lights(lights, features);
   features.instanced_triangles = triangle_count;
   features.instanced_patches = patch_count;
-  features.largest_triangle_m2 = static_cast<float>(extremes.area);
-  features.most_slanted_triangle = static_cast<float>(extremes.slantedness);
+  features.largest_triangle_m2 = to_float(extremes.area);
+  features.most_slanted_triangle = to_float(extremes.slantedness);
 }
 
 }  // namespace tessera::scene

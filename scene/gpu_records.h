@@ -49,7 +49,8 @@ struct MaterialRecord {
   float roughness, normal_scale, occlusion_strength, alpha_cutoff;
   uint32_t flags;
   uint32_t pad[3];
-  TextureUse base_color_texture, metallic_roughness_texture, normal_texture, emissive_texture, occlusion_texture;
+  TextureUse base_color_texture, metallic_roughness_texture, normal_texture, emissive_texture,
+      occlusion_texture;
 };
 static_assert(sizeof(MaterialRecord) == 224);
 constexpr uint32_t kMaterialMask = 1, kMaterialDoubleSided = 2, kMaterialUnlit = 4;

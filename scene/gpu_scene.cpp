@@ -40,7 +40,8 @@ Totals count(const Scene& scene) {
     t.patches += g.patches.size();
     t.meshlets += g.meshlets.size();
   }
-  for (const Instance& i : scene.instances) t.instanced_meshlets += scene.geometries[i.geometry].meshlets.size();
+  for (const Instance& i : scene.instances)
+    t.instanced_meshlets += scene.geometries[i.geometry].meshlets.size();
   return t;
 }
 
@@ -48,9 +49,10 @@ Totals count(const Scene& scene) {
 Status check_limits(const Totals& t, uint64_t limit) {
   const auto check = [&](const char* what, uint64_t number, uint64_t size) -> Status {
     if (number * size <= limit) return absl::OkStatus();
-    return absl::ResourceExhaustedError(absl::StrFormat(
-        "scene: %d %s need %d MiB in one buffer, this device allows %d MiB: simplify the scene or choose another device", number,
-        what, (number * size) >> 20, limit >> 20));
+    return absl::ResourceExhaustedError(
+        absl::StrFormat("scene: %d %s need %d MiB in one buffer, this device allows %d MiB: simplify the "
+                        "scene or choose another device",
+                        number, what, (number * size) >> 20, limit >> 20));
   };
   TESSERA_RETURN_IF_ERROR(check("vertices", t.vertices, sizeof(Vertex)));
   TESSERA_RETURN_IF_ERROR(check("triangles", t.triangles, 3 * sizeof(uint32_t)));
@@ -72,7 +74,8 @@ std::vector<Vertex> all_vertices(const Scene& scene, const Totals& totals) {
   return out;
 }
 
-std::vector<uint32_t> all_indices(const Scene& scene, const Totals& totals, std::span<const GeometryOffsets> offsets) {
+std::vector<uint32_t> all_indices(const Scene& scene, const Totals& totals,
+                                  std::span<const GeometryOffsets> offsets) {
   std::vector<uint32_t> out;
   out.reserve(3 * totals.triangles);
   for (size_t g = 0; g < scene.geometries.size(); ++g) {
@@ -81,7 +84,8 @@ std::vector<uint32_t> all_indices(const Scene& scene, const Totals& totals, std:
   return out;
 }
 
-std::vector<PatchRecord> all_patches(const Scene& scene, const Totals& totals, std::span<const GeometryOffsets> offsets) {
+std::vector<PatchRecord> all_patches(const Scene& scene, const Totals& totals,
+                                     std::span<const GeometryOffsets> offsets) {
   std::vector<PatchRecord> out;
   out.reserve(totals.patches);
   for (size_t g = 0; g < scene.geometries.size(); ++g) {
@@ -92,7 +96,8 @@ std::vector<PatchRecord> all_patches(const Scene& scene, const Totals& totals, s
   return out;
 }
 
-std::vector<MeshletRecord> all_meshlets(const Scene& scene, const Totals& totals, std::span<const GeometryOffsets> offsets) {
+std::vector<MeshletRecord> all_meshlets(const Scene& scene, const Totals& totals,
+                                        std::span<const GeometryOffsets> offsets) {
   std::vector<MeshletRecord> out;
   out.reserve(totals.meshlets);
   for (size_t g = 0; g < scene.geometries.size(); ++g) {
@@ -109,15 +114,17 @@ struct InstanceTables {
   std::vector<InstancedMeshlet> meshlets;
 };
 
-InstanceTables all_instances(const Scene& scene, const Totals& totals, std::span<const GeometryOffsets> offsets) {
+InstanceTables all_instances(const Scene& scene, const Totals& totals,
+                             std::span<const GeometryOffsets> offsets) {
   InstanceTables out;
   out.instances.reserve(scene.instances.size());
   out.meshlets.reserve(totals.instanced_meshlets);
   for (uint32_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
     const GeometryOffsets& offset = offsets[instance.geometry];
-    out.instances.push_back({instance.geometry, instance.material, instance.first_patch, instance.first_triangle, offset.patch,
-                             offset.triangle, static_cast<uint32_t>(out.meshlets.size()),
+    out.instances.push_back({instance.geometry, instance.material, instance.first_patch,
+                             instance.first_triangle, offset.patch, offset.triangle,
+                             static_cast<uint32_t>(out.meshlets.size()),
                              scene.nodes[instance.node].moves ? kInstanceMoves : 0});
     const size_t meshlets = scene.geometries[instance.geometry].meshlets.size();
     for (uint32_t m = 0; m < meshlets; ++m) out.meshlets.push_back({i, offset.meshlet + m});
@@ -170,8 +177,8 @@ std::vector<GeometryOffsets> geometry_offsets(const Scene& scene) {
   return out;
 }
 
-// Rows of the inverse transpose, scaled to at most 1: the cofactors, with the determinant's sign (a cofactor matrix
-// exists where no inverse does, e.g. for an object scaled flat).
+// Rows of the inverse transpose, scaled to at most 1: the cofactors, with the determinant's sign (a cofactor
+// matrix exists where no inverse does, e.g. for an object scaled flat).
 InstanceTransform to_transform(const dmat4& world, const dvec3& origin) {
   InstanceTransform out;
   const dvec3 x(world[0]), y(world[1]), z(world[2]), t = dvec3(world[3]) - origin;
@@ -211,34 +218,43 @@ Status GpuScene::Impl::upload_buffers(gpu::Device& device) {
   offsets = geometry_offsets(s);
   // One table at a time, so that only one is in staging memory.
   TESSERA_ASSIGN_OR_RETURN(buffers[kVertices], upload(device, all_vertices(s, totals), "scene vertices"));
-  TESSERA_ASSIGN_OR_RETURN(buffers[kIndices], upload(device, all_indices(s, totals, offsets), "scene indices"));
-  TESSERA_ASSIGN_OR_RETURN(buffers[kPatches], upload(device, all_patches(s, totals, offsets), "scene patches"));
-  TESSERA_ASSIGN_OR_RETURN(buffers[kMeshlets], upload(device, all_meshlets(s, totals, offsets), "scene meshlets"));
+  TESSERA_ASSIGN_OR_RETURN(buffers[kIndices],
+                           upload(device, all_indices(s, totals, offsets), "scene indices"));
+  TESSERA_ASSIGN_OR_RETURN(buffers[kPatches],
+                           upload(device, all_patches(s, totals, offsets), "scene patches"));
+  TESSERA_ASSIGN_OR_RETURN(buffers[kMeshlets],
+                           upload(device, all_meshlets(s, totals, offsets), "scene meshlets"));
   InstanceTables tables = all_instances(s, totals, offsets);
   instanced_meshlets = static_cast<uint32_t>(tables.meshlets.size());
-  TESSERA_ASSIGN_OR_RETURN(buffers[kInstances], upload(device, std::move(tables.instances), "scene instances"));
-  TESSERA_ASSIGN_OR_RETURN(buffers[kInstancedMeshlets], upload(device, std::move(tables.meshlets), "scene instanced meshlets"));
-  TESSERA_ASSIGN_OR_RETURN(buffers[kMaterials], upload(device, all_materials(s, textures.slots), "scene materials"));
+  TESSERA_ASSIGN_OR_RETURN(buffers[kInstances],
+                           upload(device, std::move(tables.instances), "scene instances"));
+  TESSERA_ASSIGN_OR_RETURN(buffers[kInstancedMeshlets],
+                           upload(device, std::move(tables.meshlets), "scene instanced meshlets"));
+  TESSERA_ASSIGN_OR_RETURN(buffers[kMaterials],
+                           upload(device, all_materials(s, textures.slots), "scene materials"));
   return absl::OkStatus();
 }
 
 Status GpuScene::Impl::bind(gpu::Device& device) {
   std::vector<gpu::Binding> bindings;
   for (uint32_t b = 0; b < kBufferBindings; ++b) bindings.push_back({b, gpu::BindingKind::storage_buffer});
-  bindings.push_back({kTextures, gpu::BindingKind::sampled_image, static_cast<uint32_t>(textures.images.size())});
+  bindings.push_back(
+      {kTextures, gpu::BindingKind::sampled_image, static_cast<uint32_t>(textures.images.size())});
   TESSERA_ASSIGN_OR_RETURN(layout, gpu::BindLayout::create(device, bindings));
   const gpu::Binding transforms{0, gpu::BindingKind::storage_buffer};
   TESSERA_ASSIGN_OR_RETURN(instant_layout, gpu::BindLayout::create(device, std::span(&transforms, 1)));
   TESSERA_ASSIGN_OR_RETURN(group, gpu::BindGroup::create(device, layout));
   for (uint32_t b = 0; b < kBufferBindings; ++b) group.set(b, buffers[b]);
-  for (uint32_t t = 0; t < textures.images.size(); ++t) group.set(kTextures, textures.images[t], textures.samplers[t], t);
+  for (uint32_t t = 0; t < textures.images.size(); ++t)
+    group.set(kTextures, textures.images[t], textures.samplers[t], t);
   return absl::OkStatus();
 }
 
 GpuScene::GpuScene(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 GpuScene::~GpuScene() = default;
 
-StatusOr<std::unique_ptr<GpuScene>> GpuScene::create(gpu::Device& device, std::shared_ptr<const Scene> scene) {
+StatusOr<std::unique_ptr<GpuScene>> GpuScene::create(gpu::Device& device,
+                                                     std::shared_ptr<const Scene> scene) {
   auto impl = std::make_unique<Impl>();
   impl->scene = std::move(scene);
   const uint64_t bytes_before = device.memory_in_use();
@@ -249,14 +265,30 @@ StatusOr<std::unique_ptr<GpuScene>> GpuScene::create(gpu::Device& device, std::s
   return std::unique_ptr<GpuScene>(new GpuScene(std::move(impl)));
 }
 
-const Scene& GpuScene::scene() const { return *impl_->scene; }
-const gpu::BindLayout& GpuScene::layout() const { return impl_->layout; }
-const gpu::BindLayout& GpuScene::instant_layout() const { return impl_->instant_layout; }
-const gpu::BindGroup& GpuScene::group() const { return impl_->group; }
-const gpu::Buffer& GpuScene::indices() const { return impl_->buffers[kIndices]; }
-uint32_t GpuScene::first_index(uint32_t geometry) const { return 3 * impl_->offsets[geometry].triangle; }
-uint32_t GpuScene::instanced_meshlet_count() const { return impl_->instanced_meshlets; }
-uint64_t GpuScene::device_bytes() const { return impl_->device_bytes; }
+const Scene& GpuScene::scene() const {
+  return *impl_->scene;
+}
+const gpu::BindLayout& GpuScene::layout() const {
+  return impl_->layout;
+}
+const gpu::BindLayout& GpuScene::instant_layout() const {
+  return impl_->instant_layout;
+}
+const gpu::BindGroup& GpuScene::group() const {
+  return impl_->group;
+}
+const gpu::Buffer& GpuScene::indices() const {
+  return impl_->buffers[kIndices];
+}
+uint32_t GpuScene::first_index(uint32_t geometry) const {
+  return 3 * impl_->offsets[geometry].triangle;
+}
+uint32_t GpuScene::instanced_meshlet_count() const {
+  return impl_->instanced_meshlets;
+}
+uint64_t GpuScene::device_bytes() const {
+  return impl_->device_bytes;
+}
 
 std::vector<gpu::Constant> GpuScene::constants() const {
   return {{0, static_cast<uint32_t>(impl_->textures.images.size())}};
@@ -280,10 +312,12 @@ StatusOr<std::unique_ptr<SceneInstant>> SceneInstant::create(gpu::Device& device
   impl->scene = &scene.scene();
   const uint64_t bytes = std::max<size_t>(1, scene.scene().instances.size()) * sizeof(InstanceTransform);
   if (bytes > device.info().max_storage_buffer_range) {
-    return absl::ResourceExhaustedError(absl::StrFormat("scene: %d instances are more than this device's buffers hold: join some",
-                                                        scene.scene().instances.size()));
+    return absl::ResourceExhaustedError(
+        absl::StrFormat("scene: %d instances are more than this device's buffers hold: join some",
+                        scene.scene().instances.size()));
   }
-  TESSERA_ASSIGN_OR_RETURN(impl->transforms, gpu::Buffer::create(device, bytes, gpu::Memory::upload, "scene transforms"));
+  TESSERA_ASSIGN_OR_RETURN(impl->transforms,
+                           gpu::Buffer::create(device, bytes, gpu::Memory::upload, "scene transforms"));
   TESSERA_ASSIGN_OR_RETURN(impl->group, gpu::BindGroup::create(device, scene.instant_layout()));
   impl->group.set(0, impl->transforms);
   return std::unique_ptr<SceneInstant>(new SceneInstant(std::move(impl)));
@@ -309,9 +343,17 @@ void SceneInstant::set(TimeNs time_ns, const dvec3& origin) {
   s.is_set = true;
 }
 
-const dvec3& SceneInstant::origin() const { return impl_->origin; }
-TimeNs SceneInstant::time_ns() const { return impl_->time_ns; }
-const gpu::BindGroup& SceneInstant::group() const { return impl_->group; }
-const std::vector<dmat4>& SceneInstant::instance_transforms() const { return impl_->world; }
+const dvec3& SceneInstant::origin() const {
+  return impl_->origin;
+}
+TimeNs SceneInstant::time_ns() const {
+  return impl_->time_ns;
+}
+const gpu::BindGroup& SceneInstant::group() const {
+  return impl_->group;
+}
+const std::vector<dmat4>& SceneInstant::instance_transforms() const {
+  return impl_->world;
+}
 
 }  // namespace tessera::scene

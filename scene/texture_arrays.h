@@ -1,5 +1,5 @@
-// Puts a scene's textures into few 2D texture arrays: one array holds one size, encoding and sampler, so that the number
-// of textures is not limited by the device's bindings.
+// Puts a scene's textures into few 2D texture arrays: one array holds one size, encoding and sampler, so that
+// the number of textures is not limited by the device's bindings.
 #pragma once
 
 #include <cstdint>
@@ -25,11 +25,12 @@ struct TextureArrayKind {
 struct TextureArrayPlan {
   uint32_t width = 1, height = 1;
   TextureArrayKind kind;
-  std::vector<uint32_t> textures;  // layer i holds Scene::textures[textures[i]], resampled where its size differs
+  std::vector<uint32_t>
+      textures;  // layer i holds Scene::textures[textures[i]], resampled where its size differs
 };
 
-// At most `max_arrays` (>= 2) arrays that hold every texture once. Where sizes and kinds are more, the smallest arrays
-// go to the nearest size of their own kind, and if none is left, of their own encoding.
+// At most `max_arrays` (>= 2) arrays that hold every texture once. Where sizes and kinds are more, the
+// smallest arrays go to the nearest size of their own kind, and if none is left, of their own encoding.
 std::vector<TextureArrayPlan> plan_texture_arrays(std::span<const Texture> textures, uint32_t max_arrays);
 
 struct TextureSlot {

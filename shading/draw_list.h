@@ -47,13 +47,10 @@ class Frustum {
 DrawList build_draw_list(const scene::GpuScene& scene, const scene::SceneInstant& instant, const Frustum& frustum,
                          bool both_sides);
 
-// One draw a range; `before_draw(range)` may push constants.
+// One draw a range, after `before_draw(range)` has bound and pushed what it needs, culling included.
 template <class BeforeDraw>
 void record_draws(gpu::Commands& commands, std::span<const DrawRange> ranges, BeforeDraw before_draw) {
-  std::optional<gpu::Cull> cull;
   for (const DrawRange& range : ranges) {
-    if (cull != range.cull) commands.set_cull(range.cull);
-    cull = range.cull;
     before_draw(range);
     commands.draw_indexed(3 * range.triangle_count, 1, 3 * range.first_triangle, 0, range.instance);
   }

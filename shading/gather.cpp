@@ -5,6 +5,7 @@
 #include "shading/features.h"
 #include "shading/gather_work.h"
 #include "shading/growing_buffer.h"
+#include "shading/material_groups.h"
 #include "shading/shaders/gather.comp.spv.h"
 #include "shading/shaders/gather.frag.spv.h"
 #include "shading/shaders/gather.vert.spv.h"
@@ -17,13 +18,12 @@ constexpr gpu::Format kAtlasFormat = gpu::Format::rgba8_srgb;
 constexpr std::array<float, 4> kMidGrey{0.2158605f, 0.2158605f, 0.2158605f, 0};
 constexpr uint32_t kMaxGroupsX = 32768;  // Vulkan guarantees 65535
 
-enum GatherBinding : uint32_t { kBlocks, kStarts, kColors, kAtlas };
+enum GatherBinding : uint32_t { kBlocks = 1, kStarts, kColors, kAtlas };
 
 // Pass in shading/shaders/gather.glsl.
 struct PassPush {
   vec4 eye;
   uint32_t width, height;
-  uint32_t material;
   uint32_t first_chunk, end_chunk;
 };
 
@@ -43,8 +43,7 @@ struct Gather::Impl {
   const scene::GpuScene& scene;
   const Lighting& lighting;
   GatherSettings settings;
-  gpu::BindLayout layout;
-  gpu::BindGroup group;
+  MaterialGroups groups;
   gpu::ComputePipeline compute;
   gpu::RasterPipeline raster;
   gpu::Image image;
@@ -70,12 +69,11 @@ Status Gather::Impl::create() {
   if (settings.width == 0 || settings.height == 0 || settings.width > 65536 || settings.height > 65536)
     return absl::InvalidArgumentError(
         absl::StrFormat("gather: atlas of %ux%u texels, each side must be 1..65536", settings.width, settings.height));
-  TESSERA_ASSIGN_OR_RETURN(layout, gpu::BindLayout::create(device, kBindings));
-  TESSERA_ASSIGN_OR_RETURN(group, gpu::BindGroup::create(device, layout));
+  TESSERA_ASSIGN_OR_RETURN(groups, MaterialGroups::create(device, scene, kBindings));
   const gpu::ImageDesc desc{
       .width = settings.width, .height = settings.height, .format = kAtlasFormat, .storage = true};
   TESSERA_ASSIGN_OR_RETURN(image, gpu::Image::create(device, desc, "atlas"));
-  group.set(kAtlas, image);
+  groups.set(kAtlas, image);
   TESSERA_RETURN_IF_ERROR(upload({}));
   TESSERA_RETURN_IF_ERROR(create_pipelines());
   gpu::Commands commands = device.begin();
@@ -86,7 +84,7 @@ Status Gather::Impl::create() {
 
 Status Gather::Impl::create_pipelines() {
   const std::vector<const gpu::BindLayout*> layouts{&scene.layout(), &scene.instant_layout(), &lighting.layout(),
-                                                    &layout};
+                                                    &groups.layout()};
   std::vector<gpu::Constant> constants = scene.constants();
   for (const gpu::Constant& c : lighting.constants()) constants.push_back(c);
   // Single colours are computed on every path.
@@ -108,7 +106,7 @@ Status Gather::Impl::create_pipelines() {
 
 Status Gather::Impl::fit(uint32_t binding, gpu::Buffer& buffer, uint64_t bytes, gpu::Memory memory) {
   TESSERA_ASSIGN_OR_RETURN(const bool is_new, grow(device, buffer, bytes, memory, "gather"));
-  if (is_new) group.set(binding, buffer);
+  if (is_new) groups.set(binding, buffer);
   return absl::OkStatus();
 }
 
@@ -129,10 +127,9 @@ Status Gather::Impl::upload(const GatherWork& work) {
 
 void Gather::Impl::record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, const vec4& eye,
                                   const GatherWork& work) {
-  if (work.compute_batches.empty()) return;
-  commands.bind(compute, {&scene.group(), &instant.group(), &lighting.group(), &group});
   for (const ComputeBatch& batch : work.compute_batches) {
-    commands.push(PassPush{eye, settings.width, settings.height, batch.material, batch.first_chunk, batch.end_chunk});
+    commands.bind(compute, {&scene.group(), &instant.group(), &lighting.group(), &groups.of(batch.material)});
+    commands.push(PassPush{eye, settings.width, settings.height, batch.first_chunk, batch.end_chunk});
     const uint32_t chunks = batch.end_chunk - batch.first_chunk;
     const uint32_t groups_x = std::min(chunks, kMaxGroupsX);
     commands.dispatch(groups_x, (chunks + groups_x - 1) / groups_x);
@@ -144,9 +141,9 @@ void Gather::Impl::record_raster(gpu::Commands& commands, const scene::SceneInst
   if (work.raster_batches.empty()) return;
   const gpu::ColorAttachment atlas{.image = &image};
   commands.begin_rendering({.colors = {&atlas, 1}, .width = settings.width, .height = settings.height});
-  commands.bind(raster, {&scene.group(), &instant.group(), &lighting.group(), &group});
   for (const RasterBatch& batch : work.raster_batches) {
-    commands.push(PassPush{eye, settings.width, settings.height, batch.material, 0, 0});
+    commands.bind(raster, {&scene.group(), &instant.group(), &lighting.group(), &groups.of(batch.material)});
+    commands.push(PassPush{eye, settings.width, settings.height, 0, 0});
     commands.draw(6, batch.block_count, 0, batch.first_block);
   }
   commands.end_rendering();

@@ -31,7 +31,13 @@ LightPlan plan_lights(const scene::Scene& scene, bool sun_shadow, uint32_t max_s
   plan.directional = static_cast<uint32_t>(suns.size());
   plan.sun_shadows = sun_shadow && !suns.empty() ? 1 : 0;
   plan.spot_shadows = std::min({static_cast<uint32_t>(spots.size()), max_spot_shadows, kMaxSpotShadows});
-  for (const auto* type : {&suns, &spots, &points}) plan.order.insert(plan.order.end(), type->begin(), type->end());
+  const auto first_other = spots.begin() + plan.spot_shadows;
+  std::vector<uint32_t> others(first_other, spots.end());
+  spots.erase(first_other, spots.end());
+  others.insert(others.end(), points.begin(), points.end());
+  std::stable_sort(others.begin(), others.end(), stronger);
+  others.resize(std::min<size_t>(others.size(), kMaxGridLights));
+  for (const auto* part : {&suns, &spots, &others}) plan.order.insert(plan.order.end(), part->begin(), part->end());
   return plan;
 }
 

@@ -28,6 +28,7 @@ static_assert(sizeof(ShadowRecord) == 96);
 
 // Directional lights and shadowed spots together.
 constexpr uint32_t kMaxLeadingLights = 16;
+constexpr uint32_t kMaxGridLights = 256;
 
 struct LightingRecord {
   vec3 ambient_sky;

@@ -14,7 +14,7 @@ namespace {
 enum LightingBinding : uint32_t { kLeading, kGridLights, kSunMap, kSpotMaps, kCells, kCellLights };
 
 constexpr gpu::Binding kBindings[] = {{kLeading, gpu::BindingKind::uniform_buffer},
-                                      {kGridLights, gpu::BindingKind::storage_buffer},
+                                      {kGridLights, gpu::BindingKind::uniform_buffer},
                                       {kSunMap, gpu::BindingKind::sampled_image},
                                       {kSpotMaps, gpu::BindingKind::sampled_image},
                                       {kCells, gpu::BindingKind::storage_buffer},
@@ -57,7 +57,7 @@ Status Lighting::Impl::create() {
   group.set(kSunMap, maps->sun_map(), sampler);
   group.set(kSpotMaps, maps->spot_maps(), sampler);
   TESSERA_RETURN_IF_ERROR(bind_grown(kLeading, leading, sizeof(LightingRecord)));
-  TESSERA_RETURN_IF_ERROR(bind_grown(kGridLights, grid_lights, sizeof(LightRecord) * plan.grid_lights()));
+  TESSERA_RETURN_IF_ERROR(bind_grown(kGridLights, grid_lights, sizeof(LightRecord) * kMaxGridLights));
   TESSERA_RETURN_IF_ERROR(bind_grown(kCells, cells, sizeof(LightCell)));
   return bind_grown(kCellLights, cell_lights, sizeof(uint32_t));
 }

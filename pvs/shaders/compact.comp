@@ -1,6 +1,6 @@
 // Reads: what cull.comp found, and the counts of its workgroups.
-// Writes: the draw commands of each bucket, in the order of the meshlets (not of the threads, so that results repeat).
-// Meshlets of one instance that follow each other share a draw.
+// Writes: the draw commands of each bucket, in the order of the meshlets (not of the threads, so that results
+// repeat). Meshlets of one instance that follow each other share a draw.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "pvs/shaders/visibility.glsl"
@@ -34,7 +34,8 @@ void write_draw(uint index, uint bucket, uint lane) {
     triangles += meshlets[instanced_meshlets[index + end - lane].y].triangle_count;
   }
   uint first_triangle = meshlets[instanced_meshlets[index].y].first_triangle;
-  draws[first_draw[bucket] + before[bucket] + rank] = DrawCommand(3 * triangles, 1, 3 * first_triangle, 0, index);
+  draws[first_draw[bucket] + before[bucket] + rank] =
+      DrawCommand(3 * triangles, 1, 3 * first_triangle, 0, index);
   atomicAdd(group_meshlets, end - lane);
   atomicAdd(group_triangles, triangles);
 }

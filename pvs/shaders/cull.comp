@@ -1,14 +1,15 @@
 // Reads: instanced meshlets, the last view's visibility, in the second phase the depth pyramid.
-// Writes: each meshlet's instance if it is to be drawn in this phase, and how many draws a workgroup needs by bucket; in the
-// second phase the visibility for the next view.
+// Writes: each meshlet's instance if it is to be drawn in this phase, and how many draws a workgroup needs by
+// bucket; in the second phase the visibility for the next view.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "pvs/shaders/visibility.glsl"
 
 layout(local_size_x = 64) in;
 
-const uint kFrustum = 1u;    // leave out what is outside the view
-const uint kOcclusion = 2u;  // first phase: only what the last view saw; second phase: what the pyramid does not hide
+const uint kFrustum = 1u;  // leave out what is outside the view
+// First phase: only what the last view saw. Second phase: what else the pyramid does not hide.
+const uint kOcclusion = 2u;
 const uint kSecondPhase = 4u;
 
 layout(push_constant) uniform Cull {
@@ -25,9 +26,9 @@ shared uint lane_instance[kGroupSize];  // kNone = not drawn
 
 // What the view sees of a box, rounding included.
 struct Extent {
-  float nearest, farthest;      // distance ahead
-  vec4 inside;                  // greatest distance inside the planes of left, right, down, up, unscaled
-  vec2 low, high;               // tangents; only if the whole box is ahead of the near plane
+  float nearest, farthest;  // distance ahead
+  vec4 inside;              // greatest distance inside the planes of left, right, down, up, unscaled
+  vec2 low, high;           // tangents; only if the whole box is ahead of the near plane
 };
 
 Extent project(uint instance, MeshletBounds box) {
@@ -45,8 +46,8 @@ Extent project(uint instance, MeshletBounds box) {
     float ahead = -dot(view_rows[2], relative);
     e.nearest = min(e.nearest, ahead);
     e.farthest = max(e.farthest, ahead);
-    e.inside = max(e.inside, vec4(across.x - fov.x * ahead, fov.y * ahead - across.x, across.y - fov.z * ahead,
-                                  fov.w * ahead - across.y));
+    e.inside = max(e.inside, vec4(across.x - fov.x * ahead, fov.y * ahead - across.x,
+                                  across.y - fov.z * ahead, fov.w * ahead - across.y));
     e.low = min(e.low, across / ahead);
     e.high = max(e.high, across / ahead);
   }
@@ -58,7 +59,9 @@ Extent project(uint instance, MeshletBounds box) {
   return e;
 }
 
-bool is_in_frustum(Extent e) { return e.farthest > near_m && all(greaterThan(e.inside, vec4(0.0))); }
+bool is_in_frustum(Extent e) {
+  return e.farthest > near_m && all(greaterThan(e.inside, vec4(0.0)));
+}
 
 bool is_occluded(Extent e) {
   if (e.nearest <= near_m) return false;

@@ -1,12 +1,15 @@
-// Reads: the scene; gl_InstanceIndex is an index in instanced_meshlets[]. A draw covers triangles of one instance, from the
-// first of that meshlet on. Writes: the id of the draw's first triangle, and what the alpha test needs.
+// Reads: the scene; gl_InstanceIndex is an index in instanced_meshlets[]. A draw covers triangles of one
+// instance, from the first of that meshlet on. Writes: the id of the draw's first triangle, and what the
+// alpha test needs.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "scene/shaders/scene.glsl"
 
 layout(constant_id = 1) const bool kMasked = false;
 
-layout(push_constant) uniform Draw { mat4 view_projection; };
+layout(push_constant) uniform Draw {
+  mat4 view_projection;
+};
 
 layout(location = 0) flat out uint first_id;
 layout(location = 1) flat out uint material;

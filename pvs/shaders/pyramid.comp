@@ -21,7 +21,8 @@ void main() {
   float farthest = 1.0;
   for (uint y = to.y * tile; y < end.y; ++y) {
     for (uint x = to.x * tile; x < end.x; ++x) {
-      farthest = min(farthest, is_first ? texelFetch(depth, ivec2(x, y), 0).r : pyramid[from_start + y * from_size.x + x]);
+      farthest = min(farthest, is_first ? texelFetch(depth, ivec2(x, y), 0).r
+                                        : pyramid[from_start + y * from_size.x + x]);
     }
   }
   pyramid[to_start + to.y * to_size.x + to.x] = farthest;

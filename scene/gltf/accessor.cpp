@@ -5,7 +5,8 @@
 namespace tessera::scene {
 namespace {
 
-// Without a buffer view an accessor's elements are zeros that cost the file nothing: a small file must not claim many.
+// Without a buffer view an accessor's elements are zeros that cost the file nothing: a small file must not
+// claim many.
 constexpr uint64_t kMaxElementsWithoutView = 1'000'000;
 
 size_t component_size(int type) {
@@ -17,10 +18,14 @@ size_t element_size(const tinygltf::Accessor& a) {
   const size_t size = component_size(a.componentType);
   const auto columns = [&](size_t n) { return n * ((n * size + 3) / 4 * 4); };
   switch (a.type) {
-    case TINYGLTF_TYPE_MAT2: return columns(2);
-    case TINYGLTF_TYPE_MAT3: return columns(3);
-    case TINYGLTF_TYPE_MAT4: return columns(4);
-    default: return size * static_cast<size_t>(tinygltf::GetNumComponentsInType(static_cast<uint32_t>(a.type)));
+    case TINYGLTF_TYPE_MAT2:
+      return columns(2);
+    case TINYGLTF_TYPE_MAT3:
+      return columns(3);
+    case TINYGLTF_TYPE_MAT4:
+      return columns(4);
+    default:
+      return size * static_cast<size_t>(tinygltf::GetNumComponentsInType(static_cast<uint32_t>(a.type)));
   }
 }
 
@@ -31,7 +36,8 @@ size_t stride_of(const Document& document, const tinygltf::Accessor& a) {
 
 uint32_t read_unsigned(const uint8_t* bytes, int type) {
   switch (type) {
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return *bytes;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return *bytes;
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: {
       uint16_t v;
       std::memcpy(&v, bytes, sizeof v);
@@ -59,7 +65,8 @@ float read_component(const uint8_t* b, int type, bool normalized) {
       const float v = load<int8_t>(b);
       return normalized ? std::max(v / 127.f, -1.f) : v;
     }
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return normalized ? static_cast<float>(*b) / 255.f : *b;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return normalized ? static_cast<float>(*b) / 255.f : *b;
     case TINYGLTF_COMPONENT_TYPE_SHORT: {
       const float v = load<int16_t>(b);
       return normalized ? std::max(v / 32767.f, -1.f) : v;
@@ -72,11 +79,13 @@ float read_component(const uint8_t* b, int type, bool normalized) {
       const auto v = static_cast<double>(load<uint32_t>(b));
       return static_cast<float>(normalized ? v / 4294967295.0 : v);
     }
-    default: return load<float>(b);
+    default:
+      return load<float>(b);
   }
 }
 
-// First byte after `count` elements, without overflow: offsets are at most 1e15, counts at most 1e15, strides 252.
+// First byte after `count` elements, without overflow: offsets are at most 1e15, counts at most 1e15, strides
+// 252.
 uint64_t end_of(uint64_t offset, uint64_t count, uint64_t stride, uint64_t size) {
   return offset + (count - 1) * stride + size;
 }
@@ -87,11 +96,13 @@ Status check_sparse(const Document& document, const tinygltf::Accessor& a, const
   const int type = sparse.indices.componentType;
   if (type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT &&
       type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT) {
-    return document.error(indices_path + "/componentType", absl::StrFormat("%d is not an unsigned integer type", type));
+    return document.error(indices_path + "/componentType",
+                          absl::StrFormat("%d is not an unsigned integer type", type));
   }
   const auto count = static_cast<uint64_t>(sparse.count);
   if (count > a.count) {
-    return document.error(path + "/sparse/count", absl::StrFormat("%d overrides of %d elements", count, a.count));
+    return document.error(path + "/sparse/count",
+                          absl::StrFormat("%d overrides of %d elements", count, a.count));
   }
   const auto indices = document.view(sparse.indices.bufferView);
   const auto index_offset = static_cast<uint64_t>(sparse.indices.byteOffset);
@@ -100,15 +111,17 @@ Status check_sparse(const Document& document, const tinygltf::Accessor& a, const
     return document.error(indices_path, "reaches past the end of its buffer view");
   }
   const auto value_offset = static_cast<uint64_t>(sparse.values.byteOffset);
-  if (end_of(value_offset, count, element_size(a), element_size(a)) > document.view(sparse.values.bufferView).size()) {
+  if (end_of(value_offset, count, element_size(a), element_size(a)) >
+      document.view(sparse.values.bufferView).size()) {
     return document.error(values_path, "reaches past the end of its buffer view");
   }
   uint64_t next = 0;
   for (uint64_t i = 0; i < count; ++i) {
     const uint32_t index = read_unsigned(indices.data() + index_offset + i * index_size, type);
     if (index < next || index >= a.count) {
-      return document.error(indices_path, absl::StrFormat("entry %d is %d: indices must increase and stay below %d", i,
-                                                          index, a.count));
+      return document.error(
+          indices_path,
+          absl::StrFormat("entry %d is %d: indices must increase and stay below %d", i, index, a.count));
     }
     next = uint64_t{index} + 1;
   }
@@ -118,23 +131,28 @@ Status check_sparse(const Document& document, const tinygltf::Accessor& a, const
 Status check_accessor(const Document& document, const tinygltf::Accessor& a, const std::string& path) {
   if (tinygltf::GetComponentSizeInBytes(static_cast<uint32_t>(a.componentType)) <= 0 ||
       a.componentType == TINYGLTF_COMPONENT_TYPE_INT) {
-    return document.error(path + "/componentType", absl::StrFormat("%d is not a component type", a.componentType));
+    return document.error(path + "/componentType",
+                          absl::StrFormat("%d is not a component type", a.componentType));
   }
   if (a.sparse.isSparse) TESSERA_RETURN_IF_ERROR(check_sparse(document, a, path));
   if (a.bufferView < 0) {
     if (a.count <= kMaxElementsWithoutView) return absl::OkStatus();
-    return document.over_limit(path + "/count", absl::StrFormat("%d elements without a buffer view; the limit is %d",
-                                                                a.count, kMaxElementsWithoutView));
+    return document.over_limit(path + "/count",
+                               absl::StrFormat("%d elements without a buffer view; the limit is %d", a.count,
+                                               kMaxElementsWithoutView));
   }
   const size_t size = element_size(a), stride = stride_of(document, a);
   if (stride < size) {
-    return document.error(absl::StrFormat("/bufferViews/%d/byteStride", a.bufferView),
-                          absl::StrFormat("%d is less than the %d bytes of an element of %s", stride, size, path));
+    return document.error(
+        absl::StrFormat("/bufferViews/%d/byteStride", a.bufferView),
+        absl::StrFormat("%d is less than the %d bytes of an element of %s", stride, size, path));
   }
-  const uint64_t end = end_of(a.byteOffset, a.count, stride, size), available = document.view(a.bufferView).size();
+  const uint64_t end = end_of(a.byteOffset, a.count, stride, size),
+                 available = document.view(a.bufferView).size();
   if (end > available) {
-    return document.error(path + "/count", absl::StrFormat("%d elements end at byte %d of buffer view %d, which has %d",
-                                                           a.count, end, a.bufferView, available));
+    return document.error(path + "/count",
+                          absl::StrFormat("%d elements end at byte %d of buffer view %d, which has %d",
+                                          a.count, end, a.bufferView, available));
   }
   return absl::OkStatus();
 }

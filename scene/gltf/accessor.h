@@ -8,7 +8,8 @@
 
 namespace tessera::scene {
 
-// Checks that every accessor's elements lie inside its buffer views, and that sparse indices increase and exist.
+// Checks that every accessor's elements lie inside its buffer views, and that sparse indices increase and
+// exist.
 Status check_accessors(const Document& document);
 
 // Random access to the elements of one checked accessor, without a copy. `document` must outlive it.

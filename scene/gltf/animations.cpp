@@ -7,7 +7,7 @@
 namespace tessera::scene {
 namespace {
 
-constexpr double kMaxSeconds = 1e6;       // keeps nanoseconds exact in double
+constexpr double kMaxSeconds = 1e6;        // keeps nanoseconds exact in double
 constexpr uint64_t kMaxKeys = 50'000'000;  // over all channels: accessors may be shared, their copies are not
 
 bool is_finite(const vec4& v) {
@@ -17,20 +17,23 @@ bool is_finite(const vec4& v) {
 StatusOr<std::vector<double>> read_times(const Document& document, int accessor) {
   const std::string path = absl::StrCat("/accessors/", accessor);
   const AccessorView view(document, accessor);
-  if (view.components() != 1) return document.error(path + "/type", "the times of an animation must be scalars");
+  if (view.components() != 1)
+    return document.error(path + "/type", "the times of an animation must be scalars");
   std::vector<double> times;
   for (size_t i = 0; i < view.count(); ++i) {
     const double t = view.read(i).x;
     if (!std::isfinite(t) || t < 0 || t > kMaxSeconds) {
       return document.error(path, absl::StrFormat("time %d is not between 0 and %g s", i, kMaxSeconds));
     }
-    if (!times.empty() && t <= times.back()) return document.error(path, absl::StrFormat("time %d does not increase", i));
+    if (!times.empty() && t <= times.back())
+      return document.error(path, absl::StrFormat("time %d does not increase", i));
     times.push_back(t);
   }
   return times;
 }
 
-StatusOr<std::vector<vec4>> read_values(const Document& document, int accessor, const AnimationChannel& channel) {
+StatusOr<std::vector<vec4>> read_values(const Document& document, int accessor,
+                                        const AnimationChannel& channel) {
   const std::string path = absl::StrCat("/accessors/", accessor);
   const AccessorView view(document, accessor);
   const int components = channel.path == AnimationPath::rotation ? 4 : 3;
@@ -38,14 +41,17 @@ StatusOr<std::vector<vec4>> read_values(const Document& document, int accessor, 
     return document.error(path + "/type", absl::StrFormat("has %d components, the animation needs %d",
                                                           view.components(), components));
   }
-  const size_t expected = channel.times_s.size() * (channel.interpolation == Interpolation::cubic_spline ? 3 : 1);
+  const size_t expected =
+      channel.times_s.size() * (channel.interpolation == Interpolation::cubic_spline ? 3 : 1);
   if (view.count() != expected) {
-    return document.error(path + "/count", absl::StrFormat("%d values, the animation's times need %d", view.count(), expected));
+    return document.error(
+        path + "/count", absl::StrFormat("%d values, the animation's times need %d", view.count(), expected));
   }
   std::vector<vec4> values;
   for (size_t i = 0; i < view.count(); ++i) {
     values.push_back(view.read(i));
-    if (!is_finite(values.back())) return document.error(path, absl::StrFormat("element %d is not finite", i));
+    if (!is_finite(values.back()))
+      return document.error(path, absl::StrFormat("element %d is not finite", i));
   }
   return values;
 }
@@ -53,8 +59,9 @@ StatusOr<std::vector<vec4>> read_values(const Document& document, int accessor, 
 StatusOr<AnimationChannel> read_channel(const Document& document, const tinygltf::Animation& animation,
                                         const tinygltf::AnimationChannel& source, const std::string& path) {
   if (source.sampler < 0 || static_cast<size_t>(source.sampler) >= animation.samplers.size()) {
-    return document.error(path + "/sampler", absl::StrFormat("%d does not exist: the animation has %d samplers",
-                                                             source.sampler, animation.samplers.size()));
+    return document.error(path + "/sampler",
+                          absl::StrFormat("%d does not exist: the animation has %d samplers", source.sampler,
+                                          animation.samplers.size()));
   }
   const tinygltf::AnimationSampler& sampler = animation.samplers[static_cast<size_t>(source.sampler)];
   AnimationChannel channel{};
@@ -79,14 +86,16 @@ Status import_animations(const Document& document, const std::vector<uint32_t>& 
     for (size_t c = 0; c < animation.channels.size(); ++c) {
       const tinygltf::AnimationChannel& source = animation.channels[c];
       const std::string path = absl::StrFormat("/animations/%d/channels/%d", a, c);
-      if (source.target_path == "weights" || node_of[static_cast<size_t>(source.target_node)] == kNone) continue;
+      if (source.target_path == "weights" || node_of[static_cast<size_t>(source.target_node)] == kNone)
+        continue;
       TESSERA_ASSIGN_OR_RETURN(AnimationChannel channel, read_channel(document, animation, source, path));
       channel.node = node_of[static_cast<size_t>(source.target_node)];
       if (scene.nodes[channel.node].matrix) {
         return document.error(path + "/target/node", "an animated node must not have a matrix");
       }
       keys += channel.times_s.size();
-      if (keys > kMaxKeys) return document.over_limit(path, absl::StrFormat("more than %d animation keys", kMaxKeys));
+      if (keys > kMaxKeys)
+        return document.over_limit(path, absl::StrFormat("more than %d animation keys", kMaxKeys));
       scene.animation_length_s = std::max(scene.animation_length_s, channel.times_s.back());
       scene.animations.push_back(std::move(channel));
     }

@@ -18,20 +18,22 @@ uint32_t read_u32(std::span<const std::byte> bytes, size_t offset) {
 }
 
 // The payload of the chunk at `offset`, which moves behind it.
-StatusOr<std::span<const std::byte>> read_chunk(std::span<const std::byte> bytes, size_t& offset, uint32_t type,
-                                                const std::string& file) {
+StatusOr<std::span<const std::byte>> read_chunk(std::span<const std::byte> bytes, size_t& offset,
+                                                uint32_t type, const std::string& file) {
   if (bytes.size() - offset < kChunkHeaderBytes) {
     return import_error(file, "", absl::StrFormat("the file ends within a chunk header at byte %d", offset));
   }
   const uint32_t length = read_u32(bytes, offset);
   if (read_u32(bytes, offset + 4) != type) {
-    return import_error(file, "", absl::StrFormat("chunk at byte %d is of type 0x%08x, expected 0x%08x", offset,
-                                                  read_u32(bytes, offset + 4), type));
+    return import_error(file, "",
+                        absl::StrFormat("chunk at byte %d is of type 0x%08x, expected 0x%08x", offset,
+                                        read_u32(bytes, offset + 4), type));
   }
   offset += kChunkHeaderBytes;
   if (length > bytes.size() - offset) {
-    return import_error(file, "", absl::StrFormat("chunk of %d bytes at byte %d reaches past the file's end (%d bytes)",
-                                                  length, offset, bytes.size()));
+    return import_error(file, "",
+                        absl::StrFormat("chunk of %d bytes at byte %d reaches past the file's end (%d bytes)",
+                                        length, offset, bytes.size()));
   }
   const auto payload = bytes.subspan(offset, length);
   offset += length;
@@ -57,14 +59,17 @@ StatusOr<Container> open_container(std::span<const std::byte> bytes, const std::
   }
   const uint32_t length = read_u32(bytes, 8);
   if (length > bytes.size() || length < kHeaderBytes) {
-    return import_error(file, "", absl::StrFormat("the GLB header says %d bytes, the file has %d", length, bytes.size()));
+    return import_error(
+        file, "", absl::StrFormat("the GLB header says %d bytes, the file has %d", length, bytes.size()));
   }
   bytes = bytes.first(length);
   size_t offset = kHeaderBytes;
-  TESSERA_ASSIGN_OR_RETURN(const std::span<const std::byte> json, read_chunk(bytes, offset, kJsonChunk, file));
+  TESSERA_ASSIGN_OR_RETURN(const std::span<const std::byte> json,
+                           read_chunk(bytes, offset, kJsonChunk, file));
   Container container{as_text(json), {}};
   if (offset < bytes.size()) {
-    TESSERA_ASSIGN_OR_RETURN(const std::span<const std::byte> bin, read_chunk(bytes, offset, kBinChunk, file));
+    TESSERA_ASSIGN_OR_RETURN(const std::span<const std::byte> bin,
+                             read_chunk(bytes, offset, kBinChunk, file));
     container.bin = {reinterpret_cast<const uint8_t*>(bin.data()), bin.size()};
   }
   return container;
@@ -85,7 +90,8 @@ Status check_json_shape(std::string_view json, const std::string& file) {
     depth += (c == '[' || c == '{') - (c == ']' || c == '}');
     values += c == ',' || c == '[' || c == '{';
     if (depth > kMaxDepth) {
-      return import_error(file, "", absl::StrFormat("JSON is nested deeper than %d levels at byte %d", kMaxDepth, i));
+      return import_error(file, "",
+                          absl::StrFormat("JSON is nested deeper than %d levels at byte %d", kMaxDepth, i));
     }
     if (values > kMaxValues) {
       return import_error(file, "", absl::StrFormat("JSON holds more than %d values", kMaxValues));

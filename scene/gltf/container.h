@@ -21,7 +21,8 @@ struct Container {
 // Splits a GLB into its chunks, or takes anything else as JSON text. The views point into `bytes`.
 StatusOr<Container> open_container(std::span<const std::byte> bytes, const std::string& file);
 
-// Bounds the nesting depth and the number of values of JSON text, so that parsing it takes bounded stack and memory.
+// Bounds the nesting depth and the number of values of JSON text, so that parsing it takes bounded stack and
+// memory.
 Status check_json_shape(std::string_view json, const std::string& file);
 
 }  // namespace tessera::scene

@@ -91,8 +91,8 @@ Status Document::over_limit(const std::string& path, const std::string& what) co
 }
 
 StatusOr<std::unique_ptr<Document>> Document::open(std::span<const std::byte> bytes, const std::string& name,
-                                                   const std::filesystem::path& base_dir, const ImportLimits& limits,
-                                                   ImportNotes& notes) {
+                                                   const std::filesystem::path& base_dir,
+                                                   const ImportLimits& limits, ImportNotes& notes) {
   if (bytes.size() > limits.max_file_bytes) {
     return absl::ResourceExhaustedError(
         absl::StrFormat("%s: %d bytes; the limit is %d", name, bytes.size(), limits.max_file_bytes));
@@ -132,13 +132,15 @@ Status Document::load_buffers(const json& document, std::span<const uint8_t> bin
     if (const auto uri = buffers[i].find("uri"); uri != buffers[i].end()) {
       TESSERA_ASSIGN_OR_RETURN(std::vector<uint8_t> read, read_uri(uri->get<std::string>(), path + "/uri"));
       total += read.size();
-      if (total > limits_.max_file_bytes) return over_limit(path, "the buffers exceed the limit on file size");
+      if (total > limits_.max_file_bytes)
+        return over_limit(path, "the buffers exceed the limit on file size");
       data = owned_.emplace_back(std::move(read));
     } else if (i != 0) {
       return error(path + "/uri", "is missing (only buffer 0 may be the GLB's binary chunk)");
     }
     if (length > data.size()) {
-      return error(path + "/byteLength", absl::StrFormat("%d bytes, but the buffer has %d", length, data.size()));
+      return error(path + "/byteLength",
+                   absl::StrFormat("%d bytes, but the buffer has %d", length, data.size()));
     }
     buffers_.push_back(data.first(length));
   }
@@ -209,16 +211,19 @@ StatusOr<std::vector<uint8_t>> Document::read_uri(const std::string& uri, const 
   }
   const std::filesystem::path relative = percent_decoded(uri);
   const std::string shown = uri.substr(0, 80);
-  if (base_dir_.empty()) return error(path, absl::StrCat("\"", shown, "\": external files are not allowed here"));
+  if (base_dir_.empty())
+    return error(path, absl::StrCat("\"", shown, "\": external files are not allowed here"));
   const std::filesystem::path file = base_dir_ / relative;
   if (uri.empty() || relative.is_absolute() || absl::StrContains(uri, "://") || !is_inside(file, base_dir_)) {
     return error(path, absl::StrCat("\"", shown, "\" is not a file beside or below the glTF file"));
   }
   std::error_code failed;
-  const uint64_t size = std::filesystem::is_regular_file(file, failed) ? std::filesystem::file_size(file, failed) : 0;
+  const uint64_t size =
+      std::filesystem::is_regular_file(file, failed) ? std::filesystem::file_size(file, failed) : 0;
   std::ifstream in(file, std::ios::binary);
   if (failed || size == 0 || !in) return error(path, absl::StrCat("cannot read \"", shown, "\""));
-  if (size > limits_.max_file_bytes) return over_limit(path, absl::StrFormat("%d bytes; the limit is %d", size, limits_.max_file_bytes));
+  if (size > limits_.max_file_bytes)
+    return over_limit(path, absl::StrFormat("%d bytes; the limit is %d", size, limits_.max_file_bytes));
   std::vector<uint8_t> bytes(size);
   if (!in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size))) {
     return error(path, absl::StrCat("cannot read \"", shown, "\""));

@@ -1,4 +1,5 @@
-// A glTF file, parsed and checked, with the bytes it refers to. The wall to tinygltf: its exceptions end here.
+// A glTF file, parsed and checked, with the bytes it refers to. The wall to tinygltf: its exceptions end
+// here.
 #pragma once
 
 #include <tiny_gltf.h>
@@ -15,11 +16,11 @@ class Document {
  public:
   // `bytes` must outlive the document.
   static StatusOr<std::unique_ptr<Document>> open(std::span<const std::byte> bytes, const std::string& name,
-                                                  const std::filesystem::path& base_dir, const ImportLimits& limits,
-                                                  ImportNotes& notes);
+                                                  const std::filesystem::path& base_dir,
+                                                  const ImportLimits& limits, ImportNotes& notes);
 
-  // Types, ranges and indices are checked (schema.h), buffer views lie inside their buffers, and accessors (accessor.h)
-  // inside their views. Buffers and images are not in it: see below.
+  // Types, ranges and indices are checked (schema.h), buffer views lie inside their buffers, and accessors
+  // (accessor.h) inside their views. Buffers and images are not in it: see below.
   const tinygltf::Model& model() const { return model_; }
   const std::string& name() const { return name_; }
   // Bytes of a buffer view.

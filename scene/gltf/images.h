@@ -14,6 +14,7 @@ struct ImageSize {
 StatusOr<ImageSize> read_image_size(const Document& document, int image);
 
 // RGBA8, for images whose size has been checked; on all cores. Result i belongs to images[i].
-StatusOr<std::vector<std::vector<uint8_t>>> decode_images(const Document& document, std::span<const int> images);
+StatusOr<std::vector<std::vector<uint8_t>>> decode_images(const Document& document,
+                                                          std::span<const int> images);
 
 }  // namespace tessera::scene

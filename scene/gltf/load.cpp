@@ -10,9 +10,11 @@ StatusOr<std::vector<std::byte>> read_file(const std::filesystem::path& file, ui
   const bool is_file = std::filesystem::is_regular_file(file, failed);
   const uint64_t size = is_file ? std::filesystem::file_size(file, failed) : 0;
   std::ifstream in(file, std::ios::binary);
-  if (!is_file || failed || !in) return absl::NotFoundError(absl::StrCat(file.string(), ": cannot open the file"));
+  if (!is_file || failed || !in)
+    return absl::NotFoundError(absl::StrCat(file.string(), ": cannot open the file"));
   if (size > max_bytes) {
-    return absl::ResourceExhaustedError(absl::StrFormat("%s: %d bytes; the limit is %d", file.string(), size, max_bytes));
+    return absl::ResourceExhaustedError(
+        absl::StrFormat("%s: %d bytes; the limit is %d", file.string(), size, max_bytes));
   }
   std::vector<std::byte> bytes(size);
   if (!in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size))) {
@@ -42,14 +44,15 @@ StatusOr<std::shared_ptr<Scene>> import(std::span<const std::byte> bytes, const 
 
 StatusOr<std::shared_ptr<Scene>> load_gltf(const std::filesystem::path& file, const ImportOptions& options,
                                            ImportNotes* notes) {
-  TESSERA_ASSIGN_OR_RETURN(const std::vector<std::byte> bytes, read_file(file, options.limits.max_file_bytes));
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<std::byte> bytes,
+                           read_file(file, options.limits.max_file_bytes));
   const std::filesystem::path directory = file.has_parent_path() ? file.parent_path() : ".";
   return load_gltf(bytes, file.filename().string(), directory, options, notes);
 }
 
 StatusOr<std::shared_ptr<Scene>> load_gltf(std::span<const std::byte> bytes, const std::string& name,
-                                           const std::filesystem::path& base_dir, const ImportOptions& options,
-                                           ImportNotes* notes) {
+                                           const std::filesystem::path& base_dir,
+                                           const ImportOptions& options, ImportNotes* notes) {
   ImportNotes unread;
   try {
     return import(bytes, name, base_dir, options, notes ? *notes : unread);

@@ -60,7 +60,8 @@ class MaterialImporter {
     const tinygltf::PbrMetallicRoughness& pbr = source.pbrMetallicRoughness;
     Material m;
     m.name = source.name;
-    for (int c = 0; c < 4; ++c) m.base_color[c] = static_cast<float>(pbr.baseColorFactor[static_cast<size_t>(c)]);
+    for (int c = 0; c < 4; ++c)
+      m.base_color[c] = static_cast<float>(pbr.baseColorFactor[static_cast<size_t>(c)]);
     m.metallic = static_cast<float>(pbr.metallicFactor);
     m.roughness = static_cast<float>(pbr.roughnessFactor);
     m.normal_scale = static_cast<float>(source.normalTexture.scale);
@@ -75,9 +76,10 @@ class MaterialImporter {
     }
     m.double_sided = source.doubleSided;
     m.unlit = source.extensions.contains("KHR_materials_unlit");
-    m.base_color_texture = read_texture(pbr.baseColorTexture, true, path + "/pbrMetallicRoughness/baseColorTexture");
-    m.metallic_roughness_texture =
-        read_texture(pbr.metallicRoughnessTexture, false, path + "/pbrMetallicRoughness/metallicRoughnessTexture");
+    m.base_color_texture =
+        read_texture(pbr.baseColorTexture, true, path + "/pbrMetallicRoughness/baseColorTexture");
+    m.metallic_roughness_texture = read_texture(pbr.metallicRoughnessTexture, false,
+                                                path + "/pbrMetallicRoughness/metallicRoughnessTexture");
     m.normal_texture = read_texture(source.normalTexture, false, path + "/normalTexture");
     m.emissive_texture = read_texture(source.emissiveTexture, true, path + "/emissiveTexture");
     m.occlusion_texture = read_texture(source.occlusionTexture, false, path + "/occlusionTexture");
@@ -86,10 +88,12 @@ class MaterialImporter {
 
   static vec3 emissive_of(const tinygltf::Material& source) {
     vec3 emissive(0);
-    for (size_t c = 0; c < source.emissiveFactor.size(); ++c) emissive[static_cast<int>(c)] = static_cast<float>(source.emissiveFactor[c]);
+    for (size_t c = 0; c < source.emissiveFactor.size(); ++c)
+      emissive[static_cast<int>(c)] = static_cast<float>(source.emissiveFactor[c]);
     const auto strength = source.extensions.find("KHR_materials_emissive_strength");
     if (strength == source.extensions.end()) return emissive;
-    return glm::min(emissive * get_number(strength->second, "emissiveStrength", 1), vec3(std::numeric_limits<float>::max()));
+    return glm::min(emissive * get_number(strength->second, "emissiveStrength", 1),
+                    vec3(std::numeric_limits<float>::max()));
   }
 
   template <typename TextureInfo>
@@ -101,11 +105,13 @@ class MaterialImporter {
     const auto transform = info.extensions.find("KHR_texture_transform");
     if (transform != info.extensions.end()) {
       ref.uv_from_texcoord = transform_of(transform->second);
-      if (transform->second.Has("texCoord")) texcoord = static_cast<uint32_t>(transform->second.Get("texCoord").GetNumberAsInt());
+      if (transform->second.Has("texCoord"))
+        texcoord = static_cast<uint32_t>(transform->second.Get("texCoord").GetNumberAsInt());
     }
     if (texture.source < 0 || texcoord > 1) {
-      notes_.notes.push_back(path + (texcoord > 1 ? ": is ignored: only texture coordinates 0 and 1 are supported"
-                                                  : ": is ignored: the texture has no image that is supported"));
+      notes_.notes.push_back(path + (texcoord > 1
+                                         ? ": is ignored: only texture coordinates 0 and 1 are supported"
+                                         : ": is ignored: the texture has no image that is supported"));
       return {};
     }
     ref.texcoord = texcoord;
@@ -151,7 +157,8 @@ class MaterialImporter {
       Texture& first = scene_.textures[users[0]];
       first.rgba = std::move(pixels[i]);
       if (first.rgba.size() != size_t{4} * first.width * first.height) {
-        return document_.error(absl::StrCat("/images/", images[i]), "the decoded size is not that of the header");
+        return document_.error(absl::StrCat("/images/", images[i]),
+                               "the decoded size is not that of the header");
       }
     }
     return absl::OkStatus();

@@ -10,7 +10,8 @@ namespace tessera::scene {
 namespace {
 
 constexpr uint64_t kMaxInstances = 10'000'000;
-constexpr const char* kAttributes[] = {"POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"};
+constexpr const char* kAttributes[] = {"POSITION",   "NORMAL",     "TANGENT",
+                                       "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"};
 enum Attribute : size_t { position, normal, tangent, texcoord0, texcoord1, color0, attribute_count };
 
 bool is_finite(const vec4& v) {
@@ -21,7 +22,7 @@ bool is_finite(const vec4& v) {
 struct GeometryKey {
   int mode, indices;
   std::array<int, attribute_count> attributes;
-  int normal_map_texcoord;                   // of derived tangents; -1 = none are derived
+  int normal_map_texcoord;                    // of derived tangents; -1 = none are derived
   std::array<float, 6> normal_map_transform;  // likewise
   auto operator<=>(const GeometryKey&) const = default;
 };
@@ -45,9 +46,10 @@ class PrimitiveReader {
     if (key_.indices < 0) return vertex_count();
     const AccessorView indices(document_, key_.indices);
     const int type = document_.model().accessors[static_cast<size_t>(key_.indices)].componentType;
-    if (indices.components() != 1 || type == TINYGLTF_COMPONENT_TYPE_FLOAT || type == TINYGLTF_COMPONENT_TYPE_BYTE ||
-        type == TINYGLTF_COMPONENT_TYPE_SHORT) {
-      return document_.error(accessor_path(key_.indices) + "/componentType", "indices must be unsigned integer scalars");
+    if (indices.components() != 1 || type == TINYGLTF_COMPONENT_TYPE_FLOAT ||
+        type == TINYGLTF_COMPONENT_TYPE_BYTE || type == TINYGLTF_COMPONENT_TYPE_SHORT) {
+      return document_.error(accessor_path(key_.indices) + "/componentType",
+                             "indices must be unsigned integer scalars");
     }
     return indices.count();
   }
@@ -65,7 +67,9 @@ class PrimitiveReader {
 
  private:
   static std::string accessor_path(int accessor) { return absl::StrCat("/accessors/", accessor); }
-  size_t vertex_count() const { return document_.model().accessors[static_cast<size_t>(key_.attributes[position])].count; }
+  size_t vertex_count() const {
+    return document_.model().accessors[static_cast<size_t>(key_.attributes[position])].count;
+  }
 
   Status check_attributes() const {
     constexpr int kComponents[attribute_count][2] = {{3, 3}, {3, 3}, {4, 4}, {2, 2}, {2, 2}, {3, 4}};
@@ -74,11 +78,12 @@ class PrimitiveReader {
       const AccessorView view(document_, key_.attributes[a]);
       const std::string path = accessor_path(key_.attributes[a]);
       if (view.components() < kComponents[a][0] || view.components() > kComponents[a][1]) {
-        return document_.error(path + "/type", absl::StrFormat("does not fit %s of %s", kAttributes[a], path_));
+        return document_.error(path + "/type",
+                               absl::StrFormat("does not fit %s of %s", kAttributes[a], path_));
       }
       if (view.count() != vertex_count()) {
-        return document_.error(path + "/count", absl::StrFormat("%d elements, but %s has %d vertices", view.count(), path_,
-                                                                vertex_count()));
+        return document_.error(path + "/count", absl::StrFormat("%d elements, but %s has %d vertices",
+                                                                view.count(), path_, vertex_count()));
       }
     }
     return absl::OkStatus();
@@ -95,8 +100,9 @@ class PrimitiveReader {
     for (size_t i = 0; i < indices.count(); ++i) {
       corners.push_back(indices.read_index(i));
       if (corners.back() >= vertex_count()) {
-        return document_.error(accessor_path(key_.indices), absl::StrFormat("index %d is %d, but %s has %d vertices", i,
-                                                                            corners.back(), path_, vertex_count()));
+        return document_.error(accessor_path(key_.indices),
+                               absl::StrFormat("index %d is %d, but %s has %d vertices", i, corners.back(),
+                                               path_, vertex_count()));
       }
     }
     return corners;
@@ -132,7 +138,8 @@ class PrimitiveReader {
     empty.tangent = vec4(1, 0, 0, 1);
     mesh.vertices.assign(used.size(), empty);
     for (size_t a = 0; a < attribute_count; ++a) {
-      if (key_.attributes[a] >= 0) TESSERA_RETURN_IF_ERROR(read_attribute(static_cast<Attribute>(a), used, mesh));
+      if (key_.attributes[a] >= 0)
+        TESSERA_RETURN_IF_ERROR(read_attribute(static_cast<Attribute>(a), used, mesh));
     }
     return absl::OkStatus();
   }
@@ -142,7 +149,8 @@ class PrimitiveReader {
     const AccessorView view(document_, accessor);
     for (size_t i = 0; i < used.size(); ++i) {
       const vec4 value = view.read(used[i]) + vec4(0.f);  // -0 becomes 0, so that equal vertices weld
-      if (!is_finite(value)) return document_.error(accessor_path(accessor), absl::StrFormat("element %d is not finite", used[i]));
+      if (!is_finite(value))
+        return document_.error(accessor_path(accessor), absl::StrFormat("element %d is not finite", used[i]));
       set(attribute, value, view.components(), mesh.vertices[i]);
     }
     return absl::OkStatus();
@@ -150,13 +158,26 @@ class PrimitiveReader {
 
   static void set(Attribute attribute, const vec4& value, int components, Vertex& v) {
     switch (attribute) {
-      case position: v.position = vec3(value); break;
-      case normal: v.normal = vec3(value); break;
-      case tangent: v.tangent = value; break;
-      case texcoord0: v.u0 = value.x, v.v0 = value.y; break;
-      case texcoord1: v.uv1 = vec2(value); break;
-      case color0: v.color = pack_color(components == 4 ? value : vec4(vec3(value), 1)); break;
-      case attribute_count: break;
+      case position:
+        v.position = vec3(value);
+        break;
+      case normal:
+        v.normal = vec3(value);
+        break;
+      case tangent:
+        v.tangent = value;
+        break;
+      case texcoord0:
+        v.u0 = value.x, v.v0 = value.y;
+        break;
+      case texcoord1:
+        v.uv1 = vec2(value);
+        break;
+      case color0:
+        v.color = pack_color(components == 4 ? value : vec4(vec3(value), 1));
+        break;
+      case attribute_count:
+        break;
     }
   }
 
@@ -202,12 +223,14 @@ class MeshImporter {
     for (size_t p = 0; p < primitives.size(); ++p) {
       const std::string path = absl::StrFormat("/meshes/%d/primitives/%d", mesh, p);
       const int mode = primitives[p].mode;
-      if (mode != TINYGLTF_MODE_TRIANGLES && mode != TINYGLTF_MODE_TRIANGLE_STRIP && mode != TINYGLTF_MODE_TRIANGLE_FAN) {
+      if (mode != TINYGLTF_MODE_TRIANGLES && mode != TINYGLTF_MODE_TRIANGLE_STRIP &&
+          mode != TINYGLTF_MODE_TRIANGLE_FAN) {
         ++skipped_modes_;
         continue;
       }
-      const uint32_t material = primitives[p].material < 0 ? static_cast<uint32_t>(scene_.materials.size() - 1)
-                                                           : static_cast<uint32_t>(primitives[p].material);
+      const uint32_t material = primitives[p].material < 0
+                                    ? static_cast<uint32_t>(scene_.materials.size() - 1)
+                                    : static_cast<uint32_t>(primitives[p].material);
       TESSERA_ASSIGN_OR_RETURN(const uint32_t geometry, find_geometry(mesh, p, material, path));
       if (meshes_[geometry].indices.empty()) continue;
       scene_.instances.push_back({geometry, material, node});
@@ -229,7 +252,9 @@ class MeshImporter {
     if (key.attributes[normal] < 0) key.attributes[tangent] = -1;
     if (map.texture != kNone && key.attributes[tangent] < 0) {
       key.normal_map_texcoord = static_cast<int>(map.texcoord);
-      for (int i = 0; i < 6; ++i) key.normal_map_transform[static_cast<size_t>(i)] = map.uv_from_texcoord[static_cast<size_t>(i / 2)][i % 2];
+      for (int i = 0; i < 6; ++i)
+        key.normal_map_transform[static_cast<size_t>(i)] =
+            map.uv_from_texcoord[static_cast<size_t>(i / 2)][i % 2];
     }
     return key;
   }
@@ -240,10 +265,13 @@ class MeshImporter {
     if (const auto found = geometries_.find(key); found != geometries_.end()) return found->second;
     const PrimitiveReader reader(document_, key, path);
     TESSERA_ASSIGN_OR_RETURN(const uint64_t corners, reader.corner_count());
-    const uint64_t triangles = key.mode == TINYGLTF_MODE_TRIANGLES ? corners / 3 : corners < 3 ? 0 : corners - 2;
+    const uint64_t triangles = key.mode == TINYGLTF_MODE_TRIANGLES ? corners / 3
+                               : corners < 3                       ? 0
+                                                                   : corners - 2;
     unique_triangles_ += triangles;
     if (unique_triangles_ > options_.limits.max_triangles) {
-      return document_.over_limit(path, absl::StrFormat("more than %d triangles", options_.limits.max_triangles));
+      return document_.over_limit(path,
+                                  absl::StrFormat("more than %d triangles", options_.limits.max_triangles));
     }
     TESSERA_ASSIGN_OR_RETURN(SourceMesh read, reader.read());
     read.name = source.primitives.size() > 1 ? absl::StrCat(source.name, "/", p) : source.name;
@@ -284,14 +312,16 @@ class MeshImporter {
         continue;
       }
       SourceMesh& mesh = meshes_[instance.geometry];
-      for (int axis = 0; axis < 3; ++axis) mesh.scale[axis] = std::max(mesh.scale[axis], glm::length(dvec3(world[axis])));
+      for (int axis = 0; axis < 3; ++axis)
+        mesh.scale[axis] = std::max(mesh.scale[axis], glm::length(dvec3(world[axis])));
       ++instance_counts_[instance.geometry];
       triangles += mesh.triangle_count();
       if (triangles > options_.limits.max_instanced_triangles) return instanced_limit();
       kept.push_back(instance);
     }
     scene_.instances = std::move(kept);
-    if (flat_instances_ > 0) notes_.notes.push_back(absl::StrFormat("%d instances scaled to nothing are left out", flat_instances_));
+    if (flat_instances_ > 0)
+      notes_.notes.push_back(absl::StrFormat("%d instances scaled to nothing are left out", flat_instances_));
     return absl::OkStatus();
   }
 
@@ -300,8 +330,9 @@ class MeshImporter {
     for (int c = 0; c < 4; ++c) {
       for (int r = 0; r < 3; ++r) {
         if (std::abs(world[c][r]) <= kMaxCoordinate) continue;
-        return document_.error("/nodes", absl::StrFormat("the world transform of node \"%s\" is not finite or exceeds %g",
-                                                         scene_.nodes[instance.node].name, kMaxCoordinate));
+        return document_.error(
+            "/nodes", absl::StrFormat("the world transform of node \"%s\" is not finite or exceeds %g",
+                                      scene_.nodes[instance.node].name, kMaxCoordinate));
       }
     }
     return absl::OkStatus();
@@ -314,7 +345,8 @@ class MeshImporter {
 
   Status split() {
     if (options_.max_edge_m < 0) return absl::OkStatus();
-    const double max_edge_m = options_.max_edge_m > 0 ? options_.max_edge_m : choose_max_edge(meshes_, instance_counts_);
+    const double max_edge_m =
+        options_.max_edge_m > 0 ? options_.max_edge_m : choose_max_edge(meshes_, instance_counts_);
     uint64_t before = 0, unique = 0, instanced = 0;
     for (size_t i = 0; i < meshes_.size(); ++i) {
       const uint64_t count = count_after_split(meshes_[i], max_edge_m, options_.limits.max_triangles);
@@ -322,18 +354,23 @@ class MeshImporter {
       unique += count;
       instanced += count * instance_counts_[i];
       if (unique > options_.limits.max_triangles || instanced > options_.limits.max_instanced_triangles) {
-        return document_.over_limit("", absl::StrFormat("splitting edges longer than %g m exceeds the limit on triangles", max_edge_m));
+        return document_.over_limit(
+            "",
+            absl::StrFormat("splitting edges longer than %g m exceeds the limit on triangles", max_edge_m));
       }
     }
     for (SourceMesh& mesh : meshes_) split_long_edges(mesh, max_edge_m);
-    notes_.notes.push_back(absl::StrFormat("edges longer than %g m are split: %d instanced triangles became %d",
-                                           max_edge_m, before, instanced));
+    notes_.notes.push_back(absl::StrFormat(
+        "edges longer than %g m are split: %d instanced triangles became %d", max_edge_m, before, instanced));
     return absl::OkStatus();
   }
 
   void add_notes() {
-    if (skipped_modes_ > 0) notes_.notes.push_back(absl::StrFormat("%d primitives of points or lines are left out", skipped_modes_));
-    if (degenerate_ > 0) notes_.notes.push_back(absl::StrFormat("%d triangles without area are left out", degenerate_));
+    if (skipped_modes_ > 0)
+      notes_.notes.push_back(
+          absl::StrFormat("%d primitives of points or lines are left out", skipped_modes_));
+    if (degenerate_ > 0)
+      notes_.notes.push_back(absl::StrFormat("%d triangles without area are left out", degenerate_));
   }
 
   const Document& document_;
@@ -348,8 +385,8 @@ class MeshImporter {
 
 }  // namespace
 
-Status import_meshes(const Document& document, const std::vector<uint32_t>& node_of, const ImportOptions& options,
-                     Scene& scene, ImportNotes& notes) {
+Status import_meshes(const Document& document, const std::vector<uint32_t>& node_of,
+                     const ImportOptions& options, Scene& scene, ImportNotes& notes) {
   return MeshImporter(document, options, scene, notes).run(node_of);
 }
 

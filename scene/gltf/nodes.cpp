@@ -5,7 +5,9 @@
 namespace tessera::scene {
 namespace {
 
-std::string node_path(size_t node) { return absl::StrCat("/nodes/", node); }
+std::string node_path(size_t node) {
+  return absl::StrCat("/nodes/", node);
+}
 
 // Parent of each glTF node; -1 = root.
 StatusOr<std::vector<int>> find_parents(const Document& document) {
@@ -15,8 +17,9 @@ StatusOr<std::vector<int>> find_parents(const Document& document) {
     for (size_t c = 0; c < nodes[i].children.size(); ++c) {
       int& parent = parents[static_cast<size_t>(nodes[i].children[c])];
       if (parent >= 0) {
-        return document.error(absl::StrFormat("/nodes/%d/children/%d", i, c),
-                              absl::StrFormat("node %d is a child of node %d already", nodes[i].children[c], parent));
+        return document.error(
+            absl::StrFormat("/nodes/%d/children/%d", i, c),
+            absl::StrFormat("node %d is a child of node %d already", nodes[i].children[c], parent));
       }
       parent = static_cast<int>(i);
     }
@@ -57,19 +60,23 @@ StatusOr<std::vector<int>> scene_roots(const Document& document, const std::vect
   for (size_t i = 0; i < model.scenes[scene].nodes.size(); ++i) {
     const int root = model.scenes[scene].nodes[i];
     const std::string path = absl::StrFormat("/scenes/%d/nodes/%d", scene, i);
-    if (parents[static_cast<size_t>(root)] >= 0) return document.error(path, absl::StrFormat("node %d is not a root", root));
-    if (seen[static_cast<size_t>(root)]) return document.error(path, absl::StrFormat("node %d is listed twice", root));
+    if (parents[static_cast<size_t>(root)] >= 0)
+      return document.error(path, absl::StrFormat("node %d is not a root", root));
+    if (seen[static_cast<size_t>(root)])
+      return document.error(path, absl::StrFormat("node %d is listed twice", root));
     seen[static_cast<size_t>(root)] = true;
     roots.push_back(root);
   }
   return roots;
 }
 
-StatusOr<dmat4> read_matrix(const Document& document, const std::vector<double>& values, const std::string& path) {
+StatusOr<dmat4> read_matrix(const Document& document, const std::vector<double>& values,
+                            const std::string& path) {
   dmat4 m;
   for (int i = 0; i < 16; ++i) m[i / 4][i % 4] = values[static_cast<size_t>(i)];
   if (m[0][3] != 0 || m[1][3] != 0 || m[2][3] != 0 || m[3][3] != 1) {
-    return document.error(path + "/matrix", "the last row is not 0 0 0 1: only affine transforms are supported");
+    return document.error(path + "/matrix",
+                          "the last row is not 0 0 0 1: only affine transforms are supported");
   }
   return m;
 }
@@ -82,12 +89,14 @@ StatusOr<Node> read_node(const Document& document, int index) {
   if (!source.matrix.empty()) {
     TESSERA_ASSIGN_OR_RETURN(node.matrix, read_matrix(document, source.matrix, path));
   }
-  if (!source.translation.empty()) node.translation = {source.translation[0], source.translation[1], source.translation[2]};
+  if (!source.translation.empty())
+    node.translation = {source.translation[0], source.translation[1], source.translation[2]};
   if (!source.scale.empty()) node.scale = {source.scale[0], source.scale[1], source.scale[2]};
   if (!source.rotation.empty()) {
     const dquat q(source.rotation[3], source.rotation[0], source.rotation[1], source.rotation[2]);
     const double length = glm::length(q);
-    if (!std::isfinite(length) || length < 1e-6) return document.error(path + "/rotation", "is not a unit quaternion");
+    if (!std::isfinite(length) || length < 1e-6)
+      return document.error(path + "/rotation", "is not a unit quaternion");
     node.rotation = q / length;
   }
   return node;
@@ -124,7 +133,8 @@ void import_lights(const Document& document, const std::vector<uint32_t>& node_o
   for (size_t i = 0; i < model.nodes.size(); ++i) {
     const auto extension = model.nodes[i].extensions.find("KHR_lights_punctual");
     if (node_of[i] == kNone || extension == model.nodes[i].extensions.end()) continue;
-    const tinygltf::Light& source = model.lights[static_cast<size_t>(extension->second.Get("light").GetNumberAsInt())];
+    const tinygltf::Light& source =
+        model.lights[static_cast<size_t>(extension->second.Get("light").GetNumberAsInt())];
     Light light;
     light.type = source.type == "directional" ? LightType::directional
                  : source.type == "spot"      ? LightType::spot

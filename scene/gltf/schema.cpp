@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double kFloatMax = std::numeric_limits<float>::max();
-constexpr double kMaxBytes = 1e15;  // of a size or an offset: exact in double
+constexpr double kMaxBytes = 1e15;         // of a size or an offset: exact in double
 constexpr uint64_t kMaxElements = 65'536;  // of arrays of materials, textures and other large records
 
 enum class Kind { boolean, integer, number, string, numbers, index, indices, object, objects, index_map };
@@ -26,27 +26,35 @@ struct Rule {
   std::string_view key;
   Kind kind;
   bool required = false;
-  double min = -kFloatMax, max = kFloatMax;  // of a number, an integer, or each element of numbers
-  size_t length = 0;                         // of numbers; 0 = any
-  std::string_view target = {};              // the array, at top level, that an index refers to
-  const Schema* schema = nullptr;            // of an object or of each of the objects
+  double min = -kFloatMax, max = kFloatMax;        // of a number, an integer, or each element of numbers
+  size_t length = 0;                               // of numbers; 0 = any
+  std::string_view target = {};                    // the array, at top level, that an index refers to
+  const Schema* schema = nullptr;                  // of an object or of each of the objects
   std::span<const std::string_view> allowed = {};  // strings
 };
 
 // Factories, so that the tables below read like the specification.
-constexpr Rule boolean(std::string_view key) { return {key, Kind::boolean}; }
-constexpr Rule integer(std::string_view key, double min, double max) { return {key, Kind::integer, false, min, max}; }
+constexpr Rule boolean(std::string_view key) {
+  return {key, Kind::boolean};
+}
+constexpr Rule integer(std::string_view key, double min, double max) {
+  return {key, Kind::integer, false, min, max};
+}
 constexpr Rule number(std::string_view key, double min = -kFloatMax, double max = kFloatMax) {
   return {key, Kind::number, false, min, max};
 }
-constexpr Rule text(std::string_view key) { return {key, Kind::string}; }
+constexpr Rule text(std::string_view key) {
+  return {key, Kind::string};
+}
 constexpr Rule one_of(std::string_view key, std::span<const std::string_view> allowed) {
   return {key, Kind::string, false, 0, 0, 0, {}, nullptr, allowed};
 }
 constexpr Rule numbers(std::string_view key, size_t length, double min = -kFloatMax, double max = kFloatMax) {
   return {key, Kind::numbers, false, min, max, length};
 }
-constexpr Rule index(std::string_view key, std::string_view target) { return {key, Kind::index, false, 0, 0, 0, target}; }
+constexpr Rule index(std::string_view key, std::string_view target) {
+  return {key, Kind::index, false, 0, 0, 0, target};
+}
 constexpr Rule indices(std::string_view key, std::string_view target) {
   return {key, Kind::indices, false, 0, 0, 0, target};
 }
@@ -74,8 +82,9 @@ constexpr Rule kAssetRules[] = {required(text("version"))};
 constexpr Schema kAsset = kAssetRules;
 constexpr Rule kBufferRules[] = {text("uri"), required(integer("byteLength", 1, kMaxBytes))};
 constexpr Schema kBuffer = kBufferRules;
-constexpr Rule kBufferViewRules[] = {required(index("buffer", "buffers")), integer("byteOffset", 0, kMaxBytes),
-                                     required(integer("byteLength", 1, kMaxBytes)), integer("byteStride", 4, 252)};
+constexpr Rule kBufferViewRules[] = {
+    required(index("buffer", "buffers")), integer("byteOffset", 0, kMaxBytes),
+    required(integer("byteLength", 1, kMaxBytes)), integer("byteStride", 4, 252)};
 constexpr Schema kBufferView = kBufferViewRules;
 constexpr Rule kSparseIndicesRules[] = {required(index("bufferView", "bufferViews")),
                                         integer("byteOffset", 0, std::numeric_limits<int>::max()),
@@ -85,7 +94,8 @@ constexpr Rule kSparseValuesRules[] = {required(index("bufferView", "bufferViews
                                        integer("byteOffset", 0, std::numeric_limits<int>::max())};
 constexpr Schema kSparseValues = kSparseValuesRules;
 constexpr Rule kSparseRules[] = {required(integer("count", 1, std::numeric_limits<int>::max())),
-                                 required(object("indices", kSparseIndices)), required(object("values", kSparseValues))};
+                                 required(object("indices", kSparseIndices)),
+                                 required(object("values", kSparseValues))};
 constexpr Schema kSparse = kSparseRules;
 constexpr Rule kAccessorRules[] = {index("bufferView", "bufferViews"),
                                    integer("byteOffset", 0, kMaxBytes),
@@ -95,8 +105,9 @@ constexpr Rule kAccessorRules[] = {index("bufferView", "bufferViews"),
                                    required(one_of("type", kAccessorTypes)),
                                    object("sparse", kSparse)};
 constexpr Schema kAccessor = kAccessorRules;
-constexpr Rule kPrimitiveRules[] = {required(index_map("attributes", "accessors")), index("indices", "accessors"),
-                                    index("material", "materials"), integer("mode", 0, 6)};
+constexpr Rule kPrimitiveRules[] = {required(index_map("attributes", "accessors")),
+                                    index("indices", "accessors"), index("material", "materials"),
+                                    integer("mode", 0, 6)};
 constexpr Schema kPrimitive = kPrimitiveRules;
 constexpr Rule kMeshRules[] = {required(objects("primitives", kPrimitive)), text("name")};
 constexpr Schema kMesh = kMeshRules;
@@ -124,8 +135,9 @@ constexpr Rule kTextureInfoRules[] = {required(index("index", "textures")), inte
                                       number("scale"), number("strength", 0, 1),
                                       object("extensions", kTextureInfoExtensions)};
 constexpr Schema kTextureInfo = kTextureInfoRules;
-constexpr Rule kPbrRules[] = {numbers("baseColorFactor", 4, 0, kFloatMax), object("baseColorTexture", kTextureInfo),
-                              number("metallicFactor", 0, 1), number("roughnessFactor", 0, 1),
+constexpr Rule kPbrRules[] = {numbers("baseColorFactor", 4, 0, kFloatMax),
+                              object("baseColorTexture", kTextureInfo), number("metallicFactor", 0, 1),
+                              number("roughnessFactor", 0, 1),
                               object("metallicRoughnessTexture", kTextureInfo)};
 constexpr Schema kPbr = kPbrRules;
 constexpr Rule kStrengthRules[] = {number("emissiveStrength", 0)};
@@ -145,7 +157,8 @@ constexpr Rule kMaterialRules[] = {text("name"),
                                    boolean("doubleSided"),
                                    object("extensions", kMaterialExtensions)};
 constexpr Schema kMaterial = kMaterialRules;
-constexpr Rule kImageRules[] = {text("name"), text("uri"), text("mimeType"), index("bufferView", "bufferViews")};
+constexpr Rule kImageRules[] = {text("name"), text("uri"), text("mimeType"),
+                                index("bufferView", "bufferViews")};
 constexpr Schema kImage = kImageRules;
 constexpr Rule kTextureRules[] = {text("name"), index("sampler", "samplers"), index("source", "images")};
 constexpr Schema kTexture = kTextureRules;
@@ -157,17 +170,23 @@ constexpr Schema kTarget = kTargetRules;
 constexpr Rule kChannelRules[] = {required(integer("sampler", 0, std::numeric_limits<int>::max())),
                                   required(object("target", kTarget))};
 constexpr Schema kChannel = kChannelRules;
-constexpr Rule kAnimationSamplerRules[] = {required(index("input", "accessors")), required(index("output", "accessors")),
+constexpr Rule kAnimationSamplerRules[] = {required(index("input", "accessors")),
+                                           required(index("output", "accessors")),
                                            one_of("interpolation", kInterpolations)};
 constexpr Schema kAnimationSampler = kAnimationSamplerRules;
 constexpr Rule kAnimationRules[] = {required(objects("channels", kChannel)),
                                     required(objects("samplers", kAnimationSampler)), text("name")};
 constexpr Schema kAnimation = kAnimationRules;
 constexpr double kHalfPi = 1.5707963267948966;
-constexpr Rule kSpotRules[] = {number("innerConeAngle", 0, kHalfPi), number("outerConeAngle", 0, kHalfPi + 1e-6)};
+constexpr Rule kSpotRules[] = {number("innerConeAngle", 0, kHalfPi),
+                               number("outerConeAngle", 0, kHalfPi + 1e-6)};
 constexpr Schema kSpot = kSpotRules;
-constexpr Rule kLightRules[] = {required(one_of("type", kLightTypes)), numbers("color", 3, 0, kFloatMax),
-                                number("intensity", 0), number("range", 0), object("spot", kSpot), text("name")};
+constexpr Rule kLightRules[] = {required(one_of("type", kLightTypes)),
+                                numbers("color", 3, 0, kFloatMax),
+                                number("intensity", 0),
+                                number("range", 0),
+                                object("spot", kSpot),
+                                text("name")};
 constexpr Schema kLight = kLightRules;
 constexpr Rule kLightsRules[] = {required(objects("lights", kLight))};
 constexpr Schema kLights = kLightsRules;
@@ -217,15 +236,20 @@ class Checker {
   }
 
  private:
-  Status error(const Place& place, const std::string& what) const { return import_error(file_, place.text(), what); }
+  Status error(const Place& place, const std::string& what) const {
+    return import_error(file_, place.text(), what);
+  }
 
   // Before anything is allocated per element.
   Status check_lengths() const {
     for (const auto& [key, value] : root_.items()) {
-      const bool small_records = key == "nodes" || key == "meshes" || key == "accessors" || key == "bufferViews";
-      const uint64_t limit = small_records ? limits_.max_nodes : std::min<uint64_t>(limits_.max_nodes, kMaxElements);
+      const bool small_records =
+          key == "nodes" || key == "meshes" || key == "accessors" || key == "bufferViews";
+      const uint64_t limit =
+          small_records ? limits_.max_nodes : std::min<uint64_t>(limits_.max_nodes, kMaxElements);
       if (value.is_array() && value.size() > limit) {
-        return import_error(file_, "/" + key, absl::StrFormat("%d elements; the limit is %d", value.size(), limit));
+        return import_error(file_, "/" + key,
+                            absl::StrFormat("%d elements; the limit is %d", value.size(), limit));
       }
     }
     return absl::OkStatus();
@@ -247,18 +271,25 @@ class Checker {
 
   Status check_value(const json& value, const Rule& rule, const Place& place) const {
     switch (rule.kind) {
-      case Kind::boolean: return value.is_boolean() ? absl::OkStatus() : error(place, "must be true or false");
-      case Kind::string: return check_string(value, rule, place);
+      case Kind::boolean:
+        return value.is_boolean() ? absl::OkStatus() : error(place, "must be true or false");
+      case Kind::string:
+        return check_string(value, rule, place);
       case Kind::integer:
         if (!value.is_number_integer()) return error(place, "must be an integer");
         return check_number(value, rule, place);
-      case Kind::number: return check_number(value, rule, place);
-      case Kind::index: return check_index(value, rule, place);
-      case Kind::object: return check_object(value, *rule.schema, place);
-      case Kind::index_map: return check_map(value, rule, place);
+      case Kind::number:
+        return check_number(value, rule, place);
+      case Kind::index:
+        return check_index(value, rule, place);
+      case Kind::object:
+        return check_object(value, *rule.schema, place);
+      case Kind::index_map:
+        return check_map(value, rule, place);
       case Kind::numbers:
       case Kind::indices:
-      case Kind::objects: return check_array(value, rule, place);
+      case Kind::objects:
+        return check_array(value, rule, place);
     }
     return absl::OkStatus();
   }
@@ -266,9 +297,11 @@ class Checker {
   Status check_string(const json& value, const Rule& rule, const Place& place) const {
     if (!value.is_string()) return error(place, "must be a string");
     const auto& text = value.get_ref<const std::string&>();
-    if (rule.allowed.empty() || std::ranges::find(rule.allowed, text) != rule.allowed.end()) return absl::OkStatus();
+    if (rule.allowed.empty() || std::ranges::find(rule.allowed, text) != rule.allowed.end())
+      return absl::OkStatus();
     std::string options;
-    for (const std::string_view option : rule.allowed) options += (options.empty() ? "" : ", ") + std::string(option);
+    for (const std::string_view option : rule.allowed)
+      options += (options.empty() ? "" : ", ") + std::string(option);
     return error(place, absl::StrCat("\"", text.substr(0, 40), "\" is not one of ", options));
   }
 
@@ -284,7 +317,8 @@ class Checker {
     const size_t count = target_size(rule.target);
     const uint64_t index = value.get<uint64_t>();
     if (index < count) return absl::OkStatus();
-    return error(place, absl::StrFormat("%d does not exist: /%s has %d elements", index, std::string(rule.target), count));
+    return error(place, absl::StrFormat("%d does not exist: /%s has %d elements", index,
+                                        std::string(rule.target), count));
   }
 
   Status check_map(const json& value, const Rule& rule, const Place& place) const {
@@ -330,7 +364,8 @@ class Checker {
 void strip_extras(json& value) {
   if (value.is_object()) {
     value.erase("extras");
-    if (const auto extensions = value.find("extensions"); extensions != value.end() && extensions->is_object()) {
+    if (const auto extensions = value.find("extensions");
+        extensions != value.end() && extensions->is_object()) {
       for (auto it = extensions->begin(); it != extensions->end();) {
         it = is_known_extension(it.key()) ? std::next(it) : extensions->erase(it);
       }
@@ -341,7 +376,9 @@ void strip_extras(json& value) {
   }
 }
 
-bool erase(json& object, const char* key) { return object.is_object() && object.erase(key) > 0; }
+bool erase(json& object, const char* key) {
+  return object.is_object() && object.erase(key) > 0;
+}
 
 // Channels without a target node are legal and mean nothing without extensions.
 void strip_aimless_channels(json& document) {

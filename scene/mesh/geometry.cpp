@@ -1,8 +1,10 @@
-// build_geometry(): meshlets by meshoptimizer, patches inside each, everything in the order of use.
+// build_geometry(): pairs of triangles, meshlets of them by meshoptimizer, everything in the order of use.
 #include <meshoptimizer.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <unordered_map>
 
 #include "scene/mesh/patches.h"
 #include "scene/mesh/source_mesh.h"
@@ -18,8 +20,8 @@ Aabb bounds_of(const std::vector<Vertex>& vertices) {
   return box;
 }
 
-// Positions in world proportions, moved to the origin and scaled to about 1: clustering and patches work alike for
-// coordinates of 1e7 and 1e-7.
+// Positions in world proportions, moved to the origin and scaled to about 1: clustering and patches work
+// alike for coordinates of 1e7 and 1e-7.
 std::vector<PatchVertex> proportioned(const SourceMesh& mesh) {
   const Aabb box = bounds_of(mesh.vertices);
   const dvec3 extent = mesh.scale * (dvec3(box.max) - dvec3(box.min));
@@ -33,26 +35,49 @@ std::vector<PatchVertex> proportioned(const SourceMesh& mesh) {
   return result;
 }
 
-// Triangles of each meshlet as vertex indices of the mesh.
-std::vector<std::vector<uint32_t>> make_meshlets(const SourceMesh& mesh, const std::vector<PatchVertex>& vertices) {
+struct CornersHash {
+  size_t operator()(const std::array<uint32_t, 3>& t) const {
+    return (t[0] * 0x9E3779B97F4A7C15ull ^ t[1]) * 0xC2B2AE3D27D4EB4Full ^ (uint64_t{t[2]} << 20);
+  }
+};
+
+// Clusters of representatives (patches.h). meshoptimizer sees one triangle of each pair and half of the
+// limit, so that pairs stay together.
+std::vector<std::vector<uint32_t>> make_clusters(const SourceMesh& mesh,
+                                                 const std::vector<PatchVertex>& vertices,
+                                                 const std::vector<uint32_t>& representatives) {
+  constexpr size_t kPairs = kMeshletTriangles / 2 / 4 * 4;  // the library wants a multiple of 4
   std::vector<vec3> positions;
   positions.reserve(vertices.size());
   for (const PatchVertex& v : vertices) positions.push_back(vec3(v.position));
-  const size_t bound = meshopt_buildMeshletsBound(mesh.indices.size(), kMeshletVertices, kMeshletTriangles);
+  std::vector<uint32_t> indices;
+  std::unordered_multimap<std::array<uint32_t, 3>, uint32_t, CornersHash> by_corners(representatives.size());
+  for (const uint32_t t : representatives) {
+    const uint32_t* corners = &mesh.indices[size_t{3} * t];
+    indices.insert(indices.end(), corners, corners + 3);
+    by_corners.insert({{corners[0], corners[1], corners[2]}, t});
+  }
+  const size_t bound = meshopt_buildMeshletsBound(indices.size(), kMeshletVertices, kPairs);
   std::vector<meshopt_Meshlet> meshlets(bound);
   std::vector<unsigned int> meshlet_vertices(bound * kMeshletVertices);
-  std::vector<unsigned char> meshlet_triangles(bound * kMeshletTriangles * 3);
-  const size_t count = meshopt_buildMeshlets(meshlets.data(), meshlet_vertices.data(), meshlet_triangles.data(),
-                                             mesh.indices.data(), mesh.indices.size(), &positions[0].x, positions.size(),
-                                             sizeof(vec3), kMeshletVertices, kMeshletTriangles, /*cone_weight=*/0);
-  std::vector<std::vector<uint32_t>> result(count);
-  for (size_t m = 0; m < count; ++m) {
-    for (size_t i = 0; i < meshlets[m].triangle_count * 3; ++i) {
-      const unsigned char local = meshlet_triangles[meshlets[m].triangle_offset + i];
-      result[m].push_back(meshlet_vertices[meshlets[m].vertex_offset + local]);
+  std::vector<unsigned char> meshlet_triangles(bound * kPairs * 3);
+  meshlets.resize(meshopt_buildMeshlets(meshlets.data(), meshlet_vertices.data(), meshlet_triangles.data(),
+                                        indices.data(), indices.size(), &positions[0].x, positions.size(),
+                                        sizeof(vec3), kMeshletVertices, kPairs, /*cone_weight=*/0));
+  std::vector<std::vector<uint32_t>> clusters;
+  for (const meshopt_Meshlet& m : meshlets) {
+    std::vector<uint32_t>& cluster = clusters.emplace_back();
+    for (size_t i = 0; i < m.triangle_count; ++i) {
+      std::array<uint32_t, 3> corners;
+      for (size_t k = 0; k < 3; ++k) {
+        corners[k] = meshlet_vertices[m.vertex_offset + meshlet_triangles[m.triangle_offset + 3 * i + k]];
+      }
+      const auto found = by_corners.find(corners);
+      cluster.push_back(found->second);
+      by_corners.erase(found);
     }
   }
-  return result;
+  return clusters;
 }
 
 void add_patches(std::span<const PatchTriangles> patches, Geometry& geometry) {
@@ -103,10 +128,11 @@ Geometry build_geometry(SourceMesh mesh) {
   if (mesh.indices.empty()) return geometry;
   const std::vector<PatchVertex> vertices = proportioned(mesh);
   geometry.indices.reserve(mesh.indices.size());
-  for (const std::vector<uint32_t>& indices : make_meshlets(mesh, vertices)) {
+  PatchMaker maker(mesh.indices, vertices);
+  for (const std::vector<uint32_t>& cluster : make_clusters(mesh, vertices, maker.representatives())) {
     const auto first_patch = static_cast<uint32_t>(geometry.patches.size());
     const uint32_t first_triangle = geometry.triangle_count();
-    add_patches(make_patches(indices, vertices), geometry);
+    add_patches(maker.make_patches(cluster), geometry);
     geometry.meshlets.push_back({first_triangle, geometry.triangle_count() - first_triangle, first_patch,
                                  static_cast<uint32_t>(geometry.patches.size()) - first_patch, vec3(0), 0});
   }

@@ -8,7 +8,8 @@
 namespace tessera::scene {
 namespace {
 
-// A triangle lower than this share of its longest edge is a line: positions are floats, so nothing real is that thin.
+// A triangle lower than this share of its longest edge is a line: positions are floats, so nothing real is
+// that thin.
 constexpr double kMinHeight = 1e-12;
 
 // Twice the area vector, in double: exact enough for slivers, and denormal positions do not vanish.
@@ -38,7 +39,8 @@ size_t drop_degenerate_triangles(SourceMesh& mesh) {
   size_t kept = 0;
   for (size_t i = 0; i < mesh.indices.size(); i += 3) {
     if (is_degenerate(mesh.vertices, &mesh.indices[i])) continue;
-    std::copy_n(mesh.indices.begin() + static_cast<ptrdiff_t>(i), 3, mesh.indices.begin() + static_cast<ptrdiff_t>(kept));
+    std::copy_n(mesh.indices.begin() + static_cast<ptrdiff_t>(i), 3,
+                mesh.indices.begin() + static_cast<ptrdiff_t>(kept));
     kept += 3;
   }
   const size_t dropped = (mesh.indices.size() - kept) / 3;
@@ -72,10 +74,12 @@ void repair_normals(SourceMesh& mesh) {
 void weld_vertices(SourceMesh& mesh) {
   if (mesh.indices.empty()) return;
   std::vector<uint32_t> remap(mesh.vertices.size());
-  const size_t count = meshopt_generateVertexRemap(remap.data(), mesh.indices.data(), mesh.indices.size(),
-                                                   mesh.vertices.data(), mesh.vertices.size(), sizeof(Vertex));
+  const size_t count =
+      meshopt_generateVertexRemap(remap.data(), mesh.indices.data(), mesh.indices.size(),
+                                  mesh.vertices.data(), mesh.vertices.size(), sizeof(Vertex));
   std::vector<Vertex> vertices(count);
-  meshopt_remapVertexBuffer(vertices.data(), mesh.vertices.data(), mesh.vertices.size(), sizeof(Vertex), remap.data());
+  meshopt_remapVertexBuffer(vertices.data(), mesh.vertices.data(), mesh.vertices.size(), sizeof(Vertex),
+                            remap.data());
   for (uint32_t& index : mesh.indices) index = remap[index];
   mesh.vertices = std::move(vertices);
 }

@@ -22,22 +22,24 @@ struct SourceMesh {
 // Removes triangles without area (they never cover a sample); slivers stay. Returns how many.
 size_t drop_degenerate_triangles(SourceMesh& mesh);
 
-// Every triangle gets vertices of its own, with the triangle's normal (glTF: missing normals mean flat shading).
+// Every triangle gets vertices of its own, with the triangle's normal (glTF: missing normals mean flat
+// shading).
 void set_flat_normals(SourceMesh& mesh);
 
-// Replaces normals without length by the normal of a triangle that uses the vertex; brings all others to unit length.
+// Replaces normals without length by the normal of a triangle that uses the vertex; brings all others to unit
+// length.
 void repair_normals(SourceMesh& mesh);
 
 // Tangents per vertex from the texture coordinates that `normal_map` uses, orthogonal to the normal, with
-// w * cross(normal, tangent) along -dP/dv (glTF: +Y of the normal map is up, v runs down). A vertex where mirrored
-// coordinates meet is doubled.
+// w * cross(normal, tangent) along -dP/dv (glTF: +Y of the normal map is up, v runs down). A vertex where
+// mirrored coordinates meet is doubled.
 void derive_tangents(SourceMesh& mesh, const TextureRef& normal_map);
 
 // Joins vertices that are equal in all bits.
 void weld_vertices(SourceMesh& mesh);
 
-// Splits edges longer than `max_edge_m` at their midpoints until none is left. The decision depends on the two
-// positions alone and is symmetric in them, so triangles that share an edge stay joined, over seams too.
+// Splits edges longer than `max_edge_m` at their midpoints until none is left. The decision depends on the
+// two positions alone and is symmetric in them, so triangles that share an edge stay joined, over seams too.
 void split_long_edges(SourceMesh& mesh, double max_edge_m);
 // Triangles that split_long_edges() would leave; counting stops above `stop_at`.
 uint64_t count_after_split(const SourceMesh& mesh, double max_edge_m, uint64_t stop_at);

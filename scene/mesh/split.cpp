@@ -11,7 +11,9 @@ template <typename Corner>
 using Triangle = std::array<Corner, 3>;
 
 // Equal bits for (p, q) and (q, p); halves first, so that large coordinates do not overflow.
-vec3 midpoint(const vec3& p, const vec3& q) { return 0.5f * p + 0.5f * q; }
+vec3 midpoint(const vec3& p, const vec3& q) {
+  return 0.5f * p + 0.5f * q;
+}
 
 class EdgeRule {
  public:
@@ -25,7 +27,8 @@ class EdgeRule {
   bool splits(const vec3& p, const vec3& q) const {
     const double whole2 = length2(p, q);
     if (whole2 <= max2_) return false;
-    // At the resolution of floats the midpoint may fall to one end; both parts must get shorter, so that it all ends.
+    // At the resolution of floats the midpoint may fall to one end; both parts must get shorter, so that it
+    // all ends.
     const vec3 m = midpoint(p, q);
     return std::max(length2(p, m), length2(m, q)) < kShorter2 * whole2;
   }
@@ -36,11 +39,11 @@ class EdgeRule {
   double max2_;
 };
 
-// `root` and what becomes of it: each flagged edge is split at once, so the neighbour over it, which flags it too, meets
-// the same vertices. `emit` returns false to stop.
+// `root` and what becomes of it: each flagged edge is split at once, so the neighbour over it, which flags it
+// too, meets the same vertices. `emit` returns false to stop.
 template <typename Corner, typename Position, typename Midpoint, typename Emit>
-bool split_triangle(const Triangle<Corner>& root, const EdgeRule& rule, Position position, Midpoint mid, Emit emit,
-                    std::vector<Triangle<Corner>>& stack) {
+bool split_triangle(const Triangle<Corner>& root, const EdgeRule& rule, Position position, Midpoint mid,
+                    Emit emit, std::vector<Triangle<Corner>>& stack) {
   stack.assign(1, root);
   while (!stack.empty()) {
     Triangle<Corner> t = stack.back();
@@ -53,7 +56,13 @@ bool split_triangle(const Triangle<Corner>& root, const EdgeRule& rule, Position
       continue;
     }
     // Turn it so that edge 0 is cut, and with two cuts also edge 1.
-    const int first = cuts == 1 ? (cut[0] ? 0 : cut[1] ? 1 : 2) : cuts == 2 ? (!cut[0] ? 1 : !cut[1] ? 2 : 0) : 0;
+    const int first = cuts == 1   ? (cut[0]   ? 0
+                                     : cut[1] ? 1
+                                              : 2)
+                      : cuts == 2 ? (!cut[0]   ? 1
+                                     : !cut[1] ? 2
+                                               : 0)
+                                  : 0;
     t = {t[first], t[(first + 1) % 3], t[(first + 2) % 3]};
     const Corner m0 = mid(t[0], t[1]);
     if (cuts == 1) {
@@ -89,7 +98,8 @@ vec3 unit_mean(const vec3& a, const vec3& b) {
 
 uint32_t mean_color(uint32_t a, uint32_t b) {
   uint32_t mean = 0;
-  for (int shift = 0; shift < 32; shift += 8) mean |= ((((a >> shift) & 255) + ((b >> shift) & 255) + 1) / 2) << shift;
+  for (int shift = 0; shift < 32; shift += 8)
+    mean |= ((((a >> shift) & 255) + ((b >> shift) & 255) + 1) / 2) << shift;
   return mean;
 }
 
@@ -109,7 +119,8 @@ Vertex middle(const Vertex& a, const Vertex& b) {
 
 void split_long_edges(SourceMesh& mesh, double max_edge_m) {
   const EdgeRule rule(mesh.scale, max_edge_m);
-  std::unordered_map<uint64_t, uint32_t> midpoints;  // by the two ends, so that neighbours share the new vertex
+  std::unordered_map<uint64_t, uint32_t>
+      midpoints;  // by the two ends, so that neighbours share the new vertex
   const auto position = [&](uint32_t v) { return mesh.vertices[v].position; };
   const auto mid = [&](uint32_t a, uint32_t b) {
     const uint64_t edge = uint64_t{std::min(a, b)} << 32 | std::max(a, b);
@@ -125,8 +136,8 @@ void split_long_edges(SourceMesh& mesh, double max_edge_m) {
   };
   std::vector<Triangle<uint32_t>> stack;
   for (size_t i = 0; i < mesh.indices.size(); i += 3) {
-    split_triangle<uint32_t>({mesh.indices[i], mesh.indices[i + 1], mesh.indices[i + 2]}, rule, position, mid, emit,
-                             stack);
+    split_triangle<uint32_t>({mesh.indices[i], mesh.indices[i + 1], mesh.indices[i + 2]}, rule, position, mid,
+                             emit, stack);
   }
   mesh.indices = std::move(indices);
 }
@@ -138,7 +149,8 @@ uint64_t count_after_split(const SourceMesh& mesh, double max_edge_m, uint64_t s
   const auto position = [](const vec3& p) { return p; };
   std::vector<Triangle<vec3>> stack;
   for (size_t i = 0; i < mesh.indices.size(); i += 3) {
-    const Triangle<vec3> t = {mesh.vertices[mesh.indices[i]].position, mesh.vertices[mesh.indices[i + 1]].position,
+    const Triangle<vec3> t = {mesh.vertices[mesh.indices[i]].position,
+                              mesh.vertices[mesh.indices[i + 1]].position,
                               mesh.vertices[mesh.indices[i + 2]].position};
     if (!split_triangle<vec3>(t, rule, position, midpoint, emit, stack)) break;
   }

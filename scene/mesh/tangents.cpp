@@ -75,7 +75,8 @@ std::vector<double> part_by_handedness(SourceMesh& mesh, const std::vector<Frame
 
 void derive_tangents(SourceMesh& mesh, const TextureRef& normal_map) {
   std::vector<Frame> frames(mesh.triangle_count());
-  for (size_t t = 0; t < frames.size(); ++t) frames[t] = triangle_frame(mesh, &mesh.indices[3 * t], normal_map);
+  for (size_t t = 0; t < frames.size(); ++t)
+    frames[t] = triangle_frame(mesh, &mesh.indices[3 * t], normal_map);
   const std::vector<double> handedness = part_by_handedness(mesh, frames);
   std::vector<dvec3> sums(mesh.vertices.size(), dvec3(0));
   for (size_t i = 0; i < mesh.indices.size(); ++i) {

@@ -44,7 +44,8 @@ uint32_t SceneBuilder::add_cutout(const std::string& name, Texture mask, float r
   return add_material(m);
 }
 
-uint32_t SceneBuilder::add_node(const dvec3& translation, const dquat& rotation, const dvec3& scale, uint32_t parent) {
+uint32_t SceneBuilder::add_node(const dvec3& translation, const dquat& rotation, const dvec3& scale,
+                                uint32_t parent) {
   Node node;
   node.parent = parent;
   node.translation = translation;

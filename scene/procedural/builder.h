@@ -19,8 +19,8 @@ class SceneBuilder {
   uint32_t add_material(Material material);
   Material& material(uint32_t index) { return scene_->materials[index]; }
 
-  uint32_t add_node(const dvec3& translation, const dquat& rotation = dquat(1, 0, 0, 0), const dvec3& scale = dvec3(1),
-                    uint32_t parent = 0);
+  uint32_t add_node(const dvec3& translation, const dquat& rotation = dquat(1, 0, 0, 0),
+                    const dvec3& scale = dvec3(1), uint32_t parent = 0);
   // Node 0 is the scene's root.
   uint32_t add_geometry(const std::string& name, SourceMesh mesh);
   void place(uint32_t geometry, uint32_t material, uint32_t node = 0);

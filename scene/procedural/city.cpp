@@ -26,7 +26,8 @@ struct HouseType {
 
 class City {
  public:
-  explicit City(uint64_t triangles) : wanted_(std::clamp<uint64_t>(triangles, 1, kMaxTriangles)), build_("city") {}
+  explicit City(uint64_t triangles)
+      : wanted_(std::clamp<uint64_t>(triangles, 1, kMaxTriangles)), build_("city") {}
 
   std::shared_ptr<Scene> run() {
     make_materials();
@@ -65,7 +66,8 @@ class City {
   }
 
   // One wall from `origin` along `right` with a row of windows a floor.
-  static void add_facade(SourceMesh& walls, SourceMesh& frames, SourceMesh& panes, vec3 origin, vec3 right, float floors) {
+  static void add_facade(SourceMesh& walls, SourceMesh& frames, SourceMesh& panes, vec3 origin, vec3 right,
+                         float floors) {
     const float width = glm::length(right), height = 3 * floors;
     const vec3 along = right / width, up(0, 1, 0), out = glm::cross(along, up);
     add_quad(walls, origin, right, height * up, 2, 1);
@@ -90,7 +92,8 @@ class City {
     const float rise = 0.35f * d, over = 0.4f;
     for (const float side : {-1.f, 1.f}) {
       const vec3 eaves(-side * (0.5f * w + over), h - 0.14f, side * (0.5f * d + over));
-      add_quad(roof, eaves, vec3(side * (w + 2 * over), 0, 0), vec3(0, rise + 0.28f, -side * (0.5f * d + over)), 2, 0.8f);
+      add_quad(roof, eaves, vec3(side * (w + 2 * over), 0, 0),
+               vec3(0, rise + 0.28f, -side * (0.5f * d + over)), 2, 0.8f);
       add_surface(walls, 8, 6, vec2(d, rise) * 0.5f, [&](float u, float v) {
         return vec3(side * 0.5f * w, h + rise * v, side * d * (0.5f - u) * (1 - v));
       });
@@ -109,7 +112,8 @@ class City {
       add_box(walls, vec3(0.25f * w, h + 0.3f * d, 0.1f * d), vec3(0.7f, 1.6f, 0.7f), 2, 0.5f);
     } else {
       add_box(roof, vec3(0, h + 0.15f, 0), vec3(w + 0.5f, 0.3f, d + 0.5f), 2, 1);
-      for (int i = 0; i < 3; ++i) add_pipe(frames, vec3(i - 1, h, -1), vec3(i - 1, h + 2.5f, -1), 0.05f, 8, 3);
+      for (int i = 0; i < 3; ++i)
+        add_pipe(frames, vec3(i - 1, h, -1), vec3(i - 1, h + 2.5f, -1), 0.05f, 8, 3);
     }
     return {{build_.add_geometry("walls", walls), type.walls},
             {build_.add_geometry("window frames", frames), wood_},
@@ -125,7 +129,8 @@ class City {
       const float spread = 1.35f * std::sin(3.1415927f * (static_cast<float>(i) + 3) / 31), size = 1.5f;
       const vec3 out(std::cos(turn), 0, std::sin(turn)), side(-std::sin(turn), 0, std::cos(turn));
       const vec3 tilt = glm::normalize(0.5f * out + vec3(0, 0.9f, 0));
-      add_quad(crown, spread * out + vec3(0, y, 0) - 0.5f * size * (side + tilt), size * side, size * tilt, size, 0.75f);
+      add_quad(crown, spread * out + vec3(0, y, 0) - 0.5f * size * (side + tilt), size * side, size * tilt,
+               size, 0.75f);
     }
     tree_ = {{build_.add_geometry("trunk", trunk), wood_}, {build_.add_geometry("crown", crown), foliage_}};
   }
@@ -155,19 +160,22 @@ class City {
     for (int i = 0; i < 6; ++i) {
       const bool far_row = i >= 3;
       const auto type = static_cast<size_t>(std::abs(7 * x + 3 * z + 2 * i)) % houses_.size();
-      place(houses_[type], corner + dvec3(11 + 13 * (i % 3), 0.12, far_row ? 36 : 12), far_row ? 0 : 3.14159265);
+      place(houses_[type], corner + dvec3(11 + 13 * (i % 3), 0.12, far_row ? 36 : 12),
+            far_row ? 0 : 3.14159265);
     }
     for (int i = 0; i < 8; ++i) {
-      place(tree_, corner + dvec3(7.5 + 4.7 * i, 0.12, 24 + 3.5 * ((5 * i + x) % 3 - 1)), 1.7 * i + x, 0.8 + 0.12 * ((i + z * z) % 4));
+      place(tree_, corner + dvec3(7.5 + 4.7 * i, 0.12, 24 + 3.5 * ((5 * i + x) % 3 - 1)), 1.7 * i + x,
+            0.8 + 0.12 * ((i + z * z) % 4));
     }
   }
 
-  // In growing squares around the origin, so that the path runs through the middle.
+  // In growing squares around the origin: the path runs through the middle.
   void place_blocks() {
     for (int ring = 0; placed_ < wanted_; ++ring) {
-      for (int z = -ring - 1; z <= ring && placed_ < wanted_; ++z) {
-        for (int x = -ring - 1; x <= ring && placed_ < wanted_; ++x) {
-          if (std::max({x, z, -x - 1, -z - 1}) == ring) place_block(x, z);
+      for (int z = -ring - 1; z <= ring; ++z) {
+        for (int x = -ring - 1; x <= ring; ++x) {
+          const bool in_ring = std::max({x, z, -x - 1, -z - 1}) == ring;
+          if (in_ring && placed_ < wanted_) place_block(x, z);
         }
       }
     }
@@ -182,17 +190,21 @@ class City {
 
 }  // namespace
 
-std::shared_ptr<Scene> make_city(uint64_t triangles) { return City(triangles).run(); }
+std::shared_ptr<Scene> make_city(uint64_t triangles) {
+  return City(triangles).run();
+}
 
 CameraPath city_path() {
   constexpr double kSeconds = 30, kRate = 60, kTauD = 6.283185307179586;
   std::vector<TimedPose> poses;
   for (int i = 0; i <= kSeconds * kRate; ++i) {
     const double t = i / kRate;
-    const dvec3 position(1.5 * std::sin(kTauD * t / 15), 1.7 + 0.02 * std::sin(kTauD * 1.8 * t), 20 - 1.4 * t);
+    const dvec3 position(1.5 * std::sin(kTauD * t / 15), 1.7 + 0.02 * std::sin(kTauD * 1.8 * t),
+                         20 - 1.4 * t);
     const double yaw = 0.8 * std::sin(kTauD * t / 9), pitch = 0.1 + 0.1 * std::sin(kTauD * t / 6);
     poses.push_back({from_seconds(t),
-                     {position, look_along(dvec3(std::sin(yaw) * std::cos(pitch), std::sin(pitch), -std::cos(yaw) * std::cos(pitch)))}});
+                     {position, look_along(dvec3(std::sin(yaw) * std::cos(pitch), std::sin(pitch),
+                                                 -std::cos(yaw) * std::cos(pitch)))}});
   }
   return CameraPath(std::move(poses));
 }

@@ -14,15 +14,18 @@ constexpr int kColumns = 6;  // in each row
 constexpr float kColumnSpacing = 4;
 constexpr double kLoopSeconds = 16;
 
-float column_z(int i) { return kColumnSpacing * (static_cast<float>(i) - 0.5f * (kColumns - 1)); }
+float column_z(int i) {
+  return kColumnSpacing * (static_cast<float>(i) - 0.5f * (kColumns - 1));
+}
 
 // What `detail` scales.
 struct Detail {
-  float cell_m;  // quads of flat surfaces
+  float cell_m;          // quads of flat surfaces
   uint32_t sides, rows;  // of columns
   uint32_t pipe_sides, sphere, knot, leaves, leaf_rows;
 };
-constexpr Detail kDetails[] = {{8, 8, 1, 5, 8, 24, 10, 1}, {1.2f, 24, 6, 8, 24, 96, 40, 2}, {0.4f, 80, 16, 14, 64, 280, 110, 4}};
+constexpr Detail kDetails[] = {
+    {8, 8, 1, 5, 8, 24, 10, 1}, {1.2f, 24, 6, 8, 24, 96, 40, 2}, {0.4f, 80, 16, 14, 64, 280, 110, 4}};
 
 class Gallery {
  public:
@@ -44,7 +47,8 @@ class Gallery {
   }
 
  private:
-  uint32_t plain(const std::string& name, vec3 color, float metallic, float roughness, vec3 emissive = vec3(0)) {
+  uint32_t plain(const std::string& name, vec3 color, float metallic, float roughness,
+                 vec3 emissive = vec3(0)) {
     Material m;
     m.name = name;
     m.base_color = vec4(color, 1);
@@ -82,7 +86,8 @@ class Gallery {
     add_box(walls, vec3(w + 0.2f, 0.5f, 0), vec3(0.4f, 1, 2 * l), 2, cell);
     add_box(walls, vec3(w + 0.2f, h - 0.6f, 0), vec3(0.4f, 1.2f, 2 * l), 2, cell);
     for (int i = 0; i <= kColumns; ++i) {
-      add_box(walls, vec3(w + 0.2f, 2.9f, column_z(i) - 0.5f * kColumnSpacing), vec3(0.4f, 3.8f, 0.7f), 2, cell);
+      add_box(walls, vec3(w + 0.2f, 2.9f, column_z(i) - 0.5f * kColumnSpacing), vec3(0.4f, 3.8f, 0.7f), 2,
+              cell);
     }
     // The roof leaves a skylight over the nave.
     for (const float side : {-1.f, 1.f}) {
@@ -107,7 +112,8 @@ class Gallery {
               [](float v) { return 0.29f + 0.15f * v * v; });
     add_box(blocks, vec3(0, 3.9f, 0), vec3(0.95f, 0.2f, 0.95f));
     add_arch(arch, vec3(0, 4, 0), vec3(0, 0, 1), 0.5f * kColumnSpacing - 0.42f, 0.28f, 0.5f, d_.sides);
-    const uint32_t shaft_geometry = build_.add_geometry("shaft", shaft), blocks_geometry = build_.add_geometry("base and capital", blocks);
+    const uint32_t shaft_geometry = build_.add_geometry("shaft", shaft),
+                   blocks_geometry = build_.add_geometry("base and capital", blocks);
     const uint32_t arch_geometry = build_.add_geometry("arch", arch);
     for (const float side : {-1.f, 1.f}) {
       for (int i = 0; i < kColumns; ++i) {
@@ -115,7 +121,8 @@ class Gallery {
         build_.place(shaft_geometry, stone_, node);
         build_.place(blocks_geometry, stone_, node);
         if (i + 1 < kColumns) {
-          build_.place(arch_geometry, stone_, build_.add_node(dvec3(side * kColumnX, 0, column_z(i) + 0.5f * kColumnSpacing)));
+          build_.place(arch_geometry, stone_,
+                       build_.add_node(dvec3(side * kColumnX, 0, column_z(i) + 0.5f * kColumnSpacing)));
         }
       }
     }
@@ -127,12 +134,13 @@ class Gallery {
     const float x = -kHalfWidth + 0.12f;
     for (int i = 0; i < 5; ++i) {
       const float y = 3.2f + 0.16f * static_cast<float>(i);
-      add_pipe(i % 2 ? steel : copper, vec3(x, y, -kHalfLength), vec3(x, y, kHalfLength), 0.022f + 0.008f * static_cast<float>(i % 3),
-               d_.pipe_sides, d_.rows / 2 + 1);
+      add_pipe(i % 2 ? steel : copper, vec3(x, y, -kHalfLength), vec3(x, y, kHalfLength),
+               0.022f + 0.008f * static_cast<float>(i % 3), d_.pipe_sides, d_.rows / 2 + 1);
     }
     for (int i = 0; i < 8; ++i) {
       const float z = -10.5f + 3 * static_cast<float>(i);
-      add_pipe(i % 2 ? copper : steel, vec3(x, 0, z), vec3(x, 3.2f + 0.16f * static_cast<float>(i % 5), z), 0.02f, d_.pipe_sides, 2);
+      add_pipe(i % 2 ? copper : steel, vec3(x, 0, z), vec3(x, 3.2f + 0.16f * static_cast<float>(i % 5), z),
+               0.02f, d_.pipe_sides, 2);
     }
     build_.add("copper pipes", copper, copper_);
     build_.add("steel pipes", steel, steel_);
@@ -142,9 +150,11 @@ class Gallery {
     SourceMesh rails, posts;
     const float x = 4.75f;
     for (const float y : {0.35f, 0.65f, 0.95f}) {
-      add_pipe(rails, vec3(x, 1 + y, -kHalfLength), vec3(x, 1 + y, kHalfLength), 0.018f, d_.pipe_sides, d_.rows / 2 + 1);
+      add_pipe(rails, vec3(x, 1 + y, -kHalfLength), vec3(x, 1 + y, kHalfLength), 0.018f, d_.pipe_sides,
+               d_.rows / 2 + 1);
     }
-    for (float z = -11.5f; z < 11.6f; z += 1) add_pipe(posts, vec3(x, 1, z), vec3(x, 1.98f, z), 0.013f, d_.pipe_sides);
+    for (float z = -11.5f; z < 11.6f; z += 1)
+      add_pipe(posts, vec3(x, 1, z), vec3(x, 1.98f, z), 0.013f, d_.pipe_sides);
     build_.add("rails", rails, steel_);
     build_.add("posts", posts, iron_);
   }
@@ -167,12 +177,14 @@ class Gallery {
     SourceMesh mesh;
     for (uint32_t i = 0; i < d_.leaves; ++i) {
       const float share = (static_cast<float>(i) + 0.5f) / static_cast<float>(d_.leaves);
-      const float turn = 2.399963f * static_cast<float>(i), length = 1.25f - 0.55f * share, lift = 0.35f + 1.0f * (1 - share);
+      const float turn = 2.399963f * static_cast<float>(i), length = 1.25f - 0.55f * share,
+                  lift = 0.35f + 1.0f * (1 - share);
       const vec3 out(std::cos(turn), 0, std::sin(turn)), side(-std::sin(turn), 0, std::cos(turn));
       add_surface(mesh, 1, d_.leaf_rows, vec2(1), [&](float u, float v) {
         const float bow = v * v;
-        return vec3(0, 0.5f, 0) + out * (0.05f + length * (0.35f * v + 0.45f * bow)) + vec3(0, length * (lift * v - 0.75f * bow), 0) +
-               side * (0.3f * length * (u - 0.5f)) + vec3(0, 0.1f * std::abs(u - 0.5f), 0);
+        return vec3(0, 0.5f, 0) + out * (0.05f + length * (0.35f * v + 0.45f * bow)) +
+               vec3(0, length * (lift * v - 0.75f * bow), 0) + side * (0.3f * length * (u - 0.5f)) +
+               vec3(0, 0.1f * std::abs(u - 0.5f), 0);
       });
     }
     return mesh;
@@ -180,11 +192,14 @@ class Gallery {
 
   void add_plants() {
     SourceMesh pot;
-    add_lathe(pot, vec3(0), 0.5f, d_.sides, std::max(2u, d_.rows), vec2(4, 1), [](float v) { return 0.2f + 0.12f * v + 0.03f * (v > 0.85f); });
+    add_lathe(pot, vec3(0), 0.5f, d_.sides, std::max(2u, d_.rows), vec2(4, 1),
+              [](float v) { return 0.2f + 0.12f * v + 0.03f * (v > 0.85f); });
     add_disc(pot, vec3(0, 0.46f, 0), 0.3f, d_.sides);
-    const uint32_t pot_geometry = build_.add_geometry("pot", pot), leaves = build_.add_geometry("leaves", make_leaves());
+    const uint32_t pot_geometry = build_.add_geometry("pot", pot),
+                   leaves = build_.add_geometry("leaves", make_leaves());
     for (int i = 0; i < 8; ++i) {
-      const float side = i % 2 ? 1.f : -1.f, z = -10.f + 5.6f * static_cast<float>(i / 2) + (i % 2 ? 1.f : 0.f);
+      const float side = i % 2 ? 1.f : -1.f,
+                  z = -10.f + 5.6f * static_cast<float>(i / 2) + (i % 2 ? 1.f : 0.f);
       // Some are mirrored, as artists do for variety.
       const uint32_t node = build_.add_node(dvec3(side * 4.1f, 0, z), glm::angleAxis(0.9 * i, dvec3(0, 1, 0)),
                                             dvec3(i % 3 == 2 ? -1 : 1, 0.85 + 0.06 * (i % 4), 1));
@@ -200,7 +215,8 @@ class Gallery {
     add_knot(knot, vec3(0), 0.42f, 0.085f, d_.knot, std::max(5u, d_.knot / 9));
     add_sphere(sphere, vec3(0), 0.3f, d_.sphere, d_.sphere / 2);
     const uint32_t pedestal_geometry = build_.add_geometry("pedestal", pedestal);
-    const uint32_t knot_geometry = build_.add_geometry("knot", knot), sphere_geometry = build_.add_geometry("sphere", sphere);
+    const uint32_t knot_geometry = build_.add_geometry("knot", knot),
+                   sphere_geometry = build_.add_geometry("sphere", sphere);
     const uint32_t knots[] = {gold_, red_, copper_}, spheres[] = {blue_, steel_, red_, gold_};
     for (int i = 0; i < 3; ++i) {
       const dvec3 at(0, 0, 6 * (i - 1));
@@ -210,7 +226,8 @@ class Gallery {
       build_.place(knot_geometry, knots[i], turntable);
     }
     for (int i = 0; i < 4; ++i) {
-      build_.place(sphere_geometry, spheres[i], build_.add_node(dvec3(i % 2 ? 2.0 : -2.0, 0.3, 9.0 - 6.0 * i)));
+      build_.place(sphere_geometry, spheres[i],
+                   build_.add_node(dvec3(i % 2 ? 2.0 : -2.0, 0.3, 9.0 - 6.0 * i)));
     }
   }
 
@@ -220,11 +237,13 @@ class Gallery {
     add_sphere(hub, vec3(0), 0.1f, d_.sphere / 2, d_.sphere / 4);
     for (int i = 0; i < 4; ++i) {
       const float a = 0.25f * kTau * static_cast<float>(i);
-      const vec3 out(std::cos(a), 0, std::sin(a)), side(-std::sin(a), 0, std::cos(a)), twist = 0.16f * side + vec3(0, 0.05f, 0);
+      const vec3 out(std::cos(a), 0, std::sin(a)), side(-std::sin(a), 0, std::cos(a)),
+          twist = 0.16f * side + vec3(0, 0.05f, 0);
       add_quad(blades, 0.1f * out - 0.5f * twist, 0.95f * out, twist, 1, d_.cell_m);
       add_quad(blades, 0.1f * out + 0.5f * twist, 0.95f * out, -twist, 1, d_.cell_m);
     }
-    const uint32_t hub_geometry = build_.add_geometry("fan hub", hub), blade_geometry = build_.add_geometry("fan blades", blades);
+    const uint32_t hub_geometry = build_.add_geometry("fan hub", hub),
+                   blade_geometry = build_.add_geometry("fan blades", blades);
     for (const double z : {-4.0, 4.0}) {
       const uint32_t node = build_.add_node(dvec3(0, 4.9, z));
       build_.spin(node, z < 0 ? 8 : -6, kLoopSeconds);
@@ -243,16 +262,20 @@ class Gallery {
     add_disc(wheel, vec3(0, 0.03f, 0), 0.14f, d_.sides);
     const uint32_t cart = build_.add_node(dvec3(3.9, 0, 8));
     constexpr float kReach = 7;
-    build_.animate({cart, AnimationPath::translation, Interpolation::cubic_spline, {0, 0.5 * kLoopSeconds, kLoopSeconds},
-                    {vec4(0), vec4(3.9f, 0, kReach, 0), vec4(0), vec4(0), vec4(3.9f, 0, -kReach, 0), vec4(0), vec4(0),
-                     vec4(3.9f, 0, kReach, 0), vec4(0)}});
+    build_.animate({cart,
+                    AnimationPath::translation,
+                    Interpolation::cubic_spline,
+                    {0, 0.5 * kLoopSeconds, kLoopSeconds},
+                    {vec4(0), vec4(3.9f, 0, kReach, 0), vec4(0), vec4(0), vec4(3.9f, 0, -kReach, 0), vec4(0),
+                     vec4(0), vec4(3.9f, 0, kReach, 0), vec4(0)}});
     build_.add("cart", body, wood_, cart);
     build_.add("cart load", load, blue_, cart);
     const uint32_t wheel_geometry = build_.add_geometry("wheel", wheel);
     for (int i = 0; i < 4; ++i) {
       const double side = i % 2 ? 1 : -1;
-      const uint32_t axle = build_.add_node(dvec3(0.27 * side, 0.14, i < 2 ? 0.35 : -0.35),
-                                            glm::angleAxis(-side * 1.5707963, dvec3(0, 0, 1)), dvec3(1), cart);
+      const uint32_t axle =
+          build_.add_node(dvec3(0.27 * side, 0.14, i < 2 ? 0.35 : -0.35),
+                          glm::angleAxis(-side * 1.5707963, dvec3(0, 0, 1)), dvec3(1), cart);
       const uint32_t rim = build_.add_node(dvec3(0), dquat(1, 0, 0, 0), dvec3(1), axle);
       build_.spin(rim, 4 * side, kLoopSeconds);
       build_.place(wheel_geometry, iron_, rim);
@@ -260,7 +283,8 @@ class Gallery {
   }
 
   void add_lights() {
-    build_.add_light({LightType::directional, vec3(1, 0.94f, 0.84f), 3.2f}, dvec3(0), dvec3(-0.62, -0.68, -0.3));
+    build_.add_light({LightType::directional, vec3(1, 0.94f, 0.84f), 3.2f}, dvec3(0),
+                     dvec3(-0.62, -0.68, -0.3));
     SourceMesh globe;
     add_sphere(globe, vec3(0), 0.09f, d_.sphere / 2 + 2, d_.sphere / 4 + 2);
     const uint32_t globe_geometry = build_.add_geometry("lamp", globe);
@@ -279,12 +303,15 @@ class Gallery {
 
   Detail d_;
   SceneBuilder build_;
-  uint32_t floor_, stone_, plaster_, wood_, steel_, copper_, gold_, red_, blue_, clay_, iron_, lamp_, leaf_, fence_;
+  uint32_t floor_, stone_, plaster_, wood_, steel_, copper_, gold_, red_, blue_, clay_, iron_, lamp_, leaf_,
+      fence_;
 };
 
 }  // namespace
 
-std::shared_ptr<Scene> make_gallery(int detail) { return Gallery(detail).run(); }
+std::shared_ptr<Scene> make_gallery(int detail) {
+  return Gallery(detail).run();
+}
 
 CameraPath gallery_path() {
   constexpr double kSeconds = 30, kRate = 60, kTauD = 6.283185307179586;
@@ -292,7 +319,8 @@ CameraPath gallery_path() {
   for (int i = 0; i <= kSeconds * kRate; ++i) {
     const double t = i / kRate, phase = 0.6 + kTauD * t / kSeconds;
     // Once around the exhibits, with a walking bob and the head turning to both sides.
-    const dvec3 position(1.7 * std::sin(phase), 1.65 + 0.02 * std::sin(kTauD * 1.8 * t), 9.5 * std::cos(phase));
+    const dvec3 position(1.7 * std::sin(phase), 1.65 + 0.02 * std::sin(kTauD * 1.8 * t),
+                         9.5 * std::cos(phase));
     const double heading = std::atan2(1.7 * std::cos(phase), -9.5 * std::sin(phase));
     const double yaw = heading + 0.7 * std::sin(kTauD * t / 7), pitch = 0.08 + 0.14 * std::sin(kTauD * t / 5);
     const dvec3 gaze(std::sin(yaw) * std::cos(pitch), std::sin(pitch), std::cos(yaw) * std::cos(pitch));

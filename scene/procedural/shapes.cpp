@@ -6,7 +6,9 @@
 namespace tessera::scene {
 namespace {
 
-uint32_t cells(float length, float cell_m) { return static_cast<uint32_t>(std::max(1.f, std::ceil(length / cell_m - 0.01f))); }
+uint32_t cells(float length, float cell_m) {
+  return static_cast<uint32_t>(std::max(1.f, std::ceil(length / cell_m - 0.01f)));
+}
 
 // Two unit vectors that with `axis` make a right-handed frame (side, up, axis).
 std::pair<vec3, vec3> frame_around(vec3 axis) {
@@ -24,7 +26,8 @@ void add_quad(SourceMesh& mesh, vec3 origin, vec3 right, vec3 up, float tile_m, 
 }
 
 void add_box(SourceMesh& mesh, vec3 center, vec3 size, float tile_m, float cell_m) {
-  const vec3 x(size.x, 0, 0), y(0, size.y, 0), z(0, 0, size.z), low = center - 0.5f * size, high = center + 0.5f * size;
+  const vec3 x(size.x, 0, 0), y(0, size.y, 0), z(0, 0, size.z), low = center - 0.5f * size,
+                                                                high = center + 0.5f * size;
   add_quad(mesh, low + z, x, y, tile_m, cell_m);
   add_quad(mesh, high - y, -z, y, tile_m, cell_m);
   add_quad(mesh, low + x, -x, y, tile_m, cell_m);
@@ -44,7 +47,8 @@ void add_pipe(SourceMesh& mesh, vec3 from, vec3 to, float radius, uint32_t sides
 void add_sphere(SourceMesh& mesh, vec3 center, float radius, uint32_t columns, uint32_t rows) {
   add_surface(mesh, columns, rows, vec2(4, 2), [&](float u, float v) {
     const float polar = 0.5f * kTau * (1 - v), around = -kTau * u;
-    const float ring = v == 0 || v == 1 ? 0.f : std::sin(polar);  // exactly 0, so that triangles at the poles vanish
+    const float ring =
+        v == 0 || v == 1 ? 0.f : std::sin(polar);  // exactly 0, so that triangles at the poles vanish
     return center + radius * vec3(ring * std::cos(around), std::cos(polar), ring * std::sin(around));
   });
 }
@@ -59,17 +63,19 @@ void add_disc(SourceMesh& mesh, vec3 center, float radius, uint32_t sides) {
 void add_knot(SourceMesh& mesh, vec3 center, float radius, float tube, uint32_t columns, uint32_t rows) {
   const auto curve = [&](float t) {
     const float r = radius * (0.7f + 0.3f * std::cos(3 * kTau * t));
-    return vec3(r * std::cos(2 * kTau * t), 0.45f * radius * std::sin(3 * kTau * t), r * std::sin(2 * kTau * t));
+    return vec3(r * std::cos(2 * kTau * t), 0.45f * radius * std::sin(3 * kTau * t),
+                r * std::sin(2 * kTau * t));
   };
   add_surface(mesh, rows, columns, vec2(1, 8), [&](float u, float v) {
     const vec3 along = glm::normalize(curve(v + 1e-3f) - curve(v - 1e-3f));
     const vec3 out = glm::normalize(curve(v) - along * glm::dot(along, curve(v)));
-    return center + curve(v) + tube * (std::cos(kTau * u) * out + std::sin(kTau * u) * glm::cross(along, out));
+    return center + curve(v) +
+           tube * (std::cos(kTau * u) * out + std::sin(kTau * u) * glm::cross(along, out));
   });
 }
 
-void add_fluted_shaft(SourceMesh& mesh, vec3 base, float radius, float height, uint32_t flutes, uint32_t sides,
-                      uint32_t rows) {
+void add_fluted_shaft(SourceMesh& mesh, vec3 base, float radius, float height, uint32_t flutes,
+                      uint32_t sides, uint32_t rows) {
   add_surface(mesh, sides, rows, vec2(2, height), [&](float u, float v) {
     const float swell = 1 - 0.16f * v * v;
     const float groove = 0.5f - 0.5f * std::cos(kTau * u * static_cast<float>(flutes));
@@ -78,7 +84,8 @@ void add_fluted_shaft(SourceMesh& mesh, vec3 base, float radius, float height, u
   });
 }
 
-void add_arch(SourceMesh& mesh, vec3 center, vec3 along, float radius, float thickness, float depth, uint32_t segments) {
+void add_arch(SourceMesh& mesh, vec3 center, vec3 along, float radius, float thickness, float depth,
+              uint32_t segments) {
   const vec3 up(0, 1, 0), front = glm::cross(along, up);
   const auto ring = [&](float u, float r, float z) {
     const float angle = 0.5f * kTau * (1 - u);
@@ -87,9 +94,12 @@ void add_arch(SourceMesh& mesh, vec3 center, vec3 along, float radius, float thi
   const float outer = radius + thickness, half = 0.5f * depth;
   const vec2 repeats(0.5f * kTau * radius, depth);
   add_surface(mesh, segments, 1, repeats, [&](float u, float v) { return ring(u, outer, half - v * depth); });
-  add_surface(mesh, segments, 1, repeats, [&](float u, float v) { return ring(u, radius, v * depth - half); });
-  add_surface(mesh, segments, 1, repeats, [&](float u, float v) { return ring(u, radius + v * thickness, half); });
-  add_surface(mesh, segments, 1, repeats, [&](float u, float v) { return ring(u, outer - v * thickness, -half); });
+  add_surface(mesh, segments, 1, repeats,
+              [&](float u, float v) { return ring(u, radius, v * depth - half); });
+  add_surface(mesh, segments, 1, repeats,
+              [&](float u, float v) { return ring(u, radius + v * thickness, half); });
+  add_surface(mesh, segments, 1, repeats,
+              [&](float u, float v) { return ring(u, outer - v * thickness, -half); });
 }
 
 }  // namespace tessera::scene

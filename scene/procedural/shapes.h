@@ -1,34 +1,37 @@
-// Shapes that procedural scenes are put together from. Each appends to a mesh, in metres, with outward winding.
+// Shapes that procedural scenes are put together from. Each appends to a mesh, in metres, with outward
+// winding.
 #pragma once
 
 #include "scene/mesh/source_mesh.h"
 
 namespace tessera::scene {
 
-// A grid of columns x rows quads over a parametric surface: point(u, v) for u, v in 0..1, with cross(dP/du, dP/dv)
-// outward. Smooth normals by central differences; texture coordinates (u, 1 - v) * repeats.
+// A grid of columns x rows quads over a parametric surface: point(u, v) for u, v in 0..1, with cross(dP/du,
+// dP/dv) outward. Smooth normals by central differences; texture coordinates (u, 1 - v) * repeats.
 template <typename Point>
 void add_surface(SourceMesh& mesh, uint32_t columns, uint32_t rows, vec2 repeats, Point point);
 
-// The parallelogram origin, origin + right, origin + up, outside towards cross(right, up); `tile_m` metres a texture
-// repeat, quads of at most `cell_m`.
+// The parallelogram origin, origin + right, origin + up, outside towards cross(right, up); `tile_m` metres a
+// texture repeat, quads of at most `cell_m`.
 void add_quad(SourceMesh& mesh, vec3 origin, vec3 right, vec3 up, float tile_m = 1, float cell_m = 1);
 void add_box(SourceMesh& mesh, vec3 center, vec3 size, float tile_m = 1, float cell_m = 1);
 // From `from` to `to`, without caps.
 void add_pipe(SourceMesh& mesh, vec3 from, vec3 to, float radius, uint32_t sides, uint32_t rings = 1);
 // Around the y axis through `base`: radius(v) for v in 0..1 from the bottom to `height`.
 template <typename Radius>
-void add_lathe(SourceMesh& mesh, vec3 base, float height, uint32_t sides, uint32_t rows, vec2 repeats, Radius radius);
+void add_lathe(SourceMesh& mesh, vec3 base, float height, uint32_t sides, uint32_t rows, vec2 repeats,
+               Radius radius);
 void add_sphere(SourceMesh& mesh, vec3 center, float radius, uint32_t columns, uint32_t rows);
 // A horizontal disc that faces up.
 void add_disc(SourceMesh& mesh, vec3 center, float radius, uint32_t sides);
 // The (2, 3) torus knot around the y axis.
 void add_knot(SourceMesh& mesh, vec3 center, float radius, float tube, uint32_t columns, uint32_t rows);
 // A column's shaft with grooves, slightly swelling (entasis).
-void add_fluted_shaft(SourceMesh& mesh, vec3 base, float radius, float height, uint32_t flutes, uint32_t sides,
-                      uint32_t rows);
+void add_fluted_shaft(SourceMesh& mesh, vec3 base, float radius, float height, uint32_t flutes,
+                      uint32_t sides, uint32_t rows);
 // Half a ring of rectangular section from center - along * radius over the top to center + along * radius.
-void add_arch(SourceMesh& mesh, vec3 center, vec3 along, float radius, float thickness, float depth, uint32_t segments);
+void add_arch(SourceMesh& mesh, vec3 center, vec3 along, float radius, float thickness, float depth,
+              uint32_t segments);
 
 constexpr float kTau = 6.283185307f;
 
@@ -61,7 +64,8 @@ void add_surface(SourceMesh& mesh, uint32_t columns, uint32_t rows, vec2 repeats
 }
 
 template <typename Radius>
-void add_lathe(SourceMesh& mesh, vec3 base, float height, uint32_t sides, uint32_t rows, vec2 repeats, Radius radius) {
+void add_lathe(SourceMesh& mesh, vec3 base, float height, uint32_t sides, uint32_t rows, vec2 repeats,
+               Radius radius) {
   add_surface(mesh, sides, rows, repeats, [&](float u, float v) {
     // Clockwise from above, so that the normal points outward.
     return base + vec3(radius(v) * std::cos(-kTau * u), height * v, radius(v) * std::sin(-kTau * u));

@@ -21,7 +21,8 @@ StatusOr<uint64_t> argument(const std::string& spec, uint64_t otherwise, uint64_
   if (colon == std::string::npos) return otherwise;
   uint64_t value;
   if (!absl::SimpleAtoi(spec.substr(colon + 1), &value) || value > max) {
-    return absl::InvalidArgumentError(absl::StrFormat("scene \"%s\": expected a number from 0 to %d after the colon", spec, max));
+    return absl::InvalidArgumentError(
+        absl::StrFormat("scene \"%s\": expected a number from 0 to %d after the colon", spec, max));
   }
   return value;
 }
@@ -34,7 +35,8 @@ StatusOr<std::shared_ptr<Scene>> load_scene(const std::string& spec) {
     return make_gallery(static_cast<int>(detail));
   }
   if (names(spec, "city")) {
-    TESSERA_ASSIGN_OR_RETURN(const uint64_t triangles, argument(spec, kDefaultCityTriangles, kMaxCityTriangles));
+    TESSERA_ASSIGN_OR_RETURN(const uint64_t triangles,
+                             argument(spec, kDefaultCityTriangles, kMaxCityTriangles));
     return make_city(triangles);
   }
   return load_gltf(std::filesystem::path(spec));

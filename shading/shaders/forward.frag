@@ -9,10 +9,9 @@ layout(constant_id = 30) const bool kMasked = false;  // the draw's material cut
 layout(location = 0) out vec4 out_color;
 
 void main() {
-  vec2 pixel = floor(gl_FragCoord.xy) + gl_SamplePosition;
-  Triangle t = fetch_triangle(draw.instance, draw.first_triangle + uint(gl_PrimitiveID));
-  SurfacePoint p = surface_point(draw.instance, draw.material, t, triangle_point(t, pixel));
-  vec4 base = base_color(p);
-  if (kMasked && base.a < materials[draw.material].alpha_cutoff) discard;
-  out_color = vec4(srgb_encode_color(shade(p, base.rgb, view.eye.xyz)), 1.0);
+  Triangle t = fetch_triangle(draw.stand, draw.first_triangle + uint(gl_PrimitiveID));
+  SurfacePoint p = surface_point(draw.stand, t, triangle_point(t, sample_position(gl_FragCoord)));
+  MaterialPoint m = material_point(p);
+  if (kMasked && m.base.a < material.alpha_cutoff) discard;
+  out_color = vec4(srgb_encode_color(shade(p, m, view.eye.xyz)), 1.0);
 }

@@ -5,5 +5,8 @@
 #include "shading/shaders/view.glsl"
 
 void main() {
-  gl_Position = view.clip_from_relative * vec4(to_relative(draw.instance, vertex_position(uint(gl_VertexIndex))), 1.0);
+  vec4 clip = view.clip_from_relative * vec4(stand_position(draw.stand, vertex_position(uint(gl_VertexIndex))), 1.0);
+  // Brings the sample to the pixel's centre.
+  clip.xy += vec2(0.5 - draw.sample_at.x, draw.sample_at.y - 0.5) * view.pixel_size.xy * clip.w;
+  gl_Position = clip;
 }

@@ -5,7 +5,7 @@
 #include "shading/shaders/view.glsl"
 
 void main() {
-  vec2 pixel = floor(gl_FragCoord.xy) + gl_SamplePosition;
-  Triangle t = fetch_triangle(draw.instance, draw.first_triangle + uint(gl_PrimitiveID));
-  if (is_cut_away(texture_point(draw.material, t, triangle_point(t, pixel)))) discard;
+  Triangle t = fetch_triangle(draw.stand, draw.first_triangle + uint(gl_PrimitiveID));
+  SurfacePoint p = texture_point(t, triangle_point(t, sample_position(gl_FragCoord)));
+  if (base_color(p).a < material.alpha_cutoff) discard;
 }

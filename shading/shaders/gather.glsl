@@ -13,12 +13,11 @@ struct Block {
 };
 const uint kBlockTransposed = 1u << 10, kBlockMasked = 1u << 11, kBlockColor = 1u << 12;
 
-layout(set = 3, binding = 0, std430) readonly buffer Blocks { Block blocks[]; };
+layout(set = 3, binding = 1, std430) readonly buffer Blocks { Block blocks[]; };
 
 layout(push_constant) uniform Pass {
   vec4 eye;  // relative to the instant's origin
   uvec2 atlas_size;
-  uint material;  // of all blocks of this dispatch or draw
   uint first_chunk, end_chunk;  // compute path
 } pass;
 
@@ -107,11 +106,12 @@ vec3 block_texel(Block block, uvec2 texel) {
   TrianglePoint point = block_point(count, at, extent, triangle);
   point.ddx *= footprint;
   point.ddy *= footprint;
-  Triangle t = fetch_triangle(block.instance, block.first_triangle + triangle);
-  SurfacePoint p = surface_point(block.instance, pass.material, t, point);
-  vec4 base = base_color(p);
-  if (is_coverage) return vec3(srgb_decode(coverage(base.a, materials[p.material].alpha_cutoff)));
-  return shade(p, base.rgb, pass.eye.xyz);
+  Stand stand = load_stand(block.instance);
+  Triangle t = fetch_triangle(stand, block.first_triangle + triangle);
+  SurfacePoint p = surface_point(stand, t, point);
+  MaterialPoint m = material_point(p);
+  if (is_coverage) return vec3(srgb_decode(coverage(m.base.a, material.alpha_cutoff)));
+  return shade(p, m, pass.eye.xyz);
 }
 
 #endif

@@ -11,8 +11,9 @@ layout(location = 0) out uvec2 out_id_depth;
 void main() {
   uint triangle = draw.first_triangle + uint(gl_PrimitiveID);
   if (kMasked) {
-    Triangle t = fetch_triangle(draw.instance, triangle);
-    if (is_cut_away(texture_point(draw.material, t, triangle_point(t, gl_FragCoord.xy)))) discard;
+    Triangle t = fetch_triangle(draw.stand, triangle);
+    SurfacePoint p = texture_point(t, triangle_point(t, sample_position(gl_FragCoord)));
+    if (base_color(p).a < material.alpha_cutoff) discard;
   }
   uint id = instances[draw.instance].first_triangle + triangle - instances[draw.instance].geometry_first_triangle;
   out_id_depth = uvec2(id + 1u, floatBitsToUint(1.0 / gl_FragCoord.w));

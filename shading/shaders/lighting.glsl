@@ -30,7 +30,8 @@ layout(set = 2, binding = 0, std140) uniform LightingRecord {
   LightRecord leading_lights[kMaxLeadingLights];  // directional ones, then shadowed spots
   ShadowRecord shadows[kMaxLeadingLights];
 };
-layout(set = 2, binding = 1, std430) readonly buffer GridLights { LightRecord grid_lights[]; };
+const uint kMaxGridLights = 256;
+layout(set = 2, binding = 1, std140) uniform GridLights { LightRecord grid_lights[kMaxGridLights]; };
 layout(set = 2, binding = 2) uniform sampler2D sun_shadow_map;    // reversed depth: nearer to the light is greater
 layout(set = 2, binding = 3) uniform sampler2D spot_shadow_maps;  // side by side
 layout(set = 2, binding = 4, std430) readonly buffer Cells { uvec2 cells[]; };  // first, count in cell_lights[]

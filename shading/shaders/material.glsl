@@ -1,4 +1,5 @@
-// The one material of every pass: what colour a surface point shows to an eye. Reads: sets 0, 1, 2.
+// The one material of every pass: what colour a surface point shows to an eye. Reads: sets 0, 1, 2, and
+// binding 0 of set 3.
 #ifndef TESSERA_MATERIAL_GLSL
 #define TESSERA_MATERIAL_GLSL
 
@@ -7,59 +8,63 @@
 #include "shading/shaders/lighting.glsl"
 #include "shading/shaders/surface.glsl"
 
-// As textureGrad does, but with the level worked out here: every path and device filters alike, and Mesa 22.3's compiler
-// aborts on textureGrad in compute shaders ("Cannot emit physreg copy instruction", LLVM 15 with AVX-512).
-vec4 sample_surface(TextureUse use, SurfacePoint p) {
-  vec2 size = vec2(textureSize(scene_textures[use.array], 0).xy);
+// Of all samples of this draw or dispatch (MaterialGroups).
+layout(set = 3, binding = 0, std140) uniform MaterialBlock { MaterialRecord material; };
+
+// As textureGrad does, but with the level worked out here, so that every path and device filters alike; `absent` where
+// the material has no such texture. Mesa 22.3's compiler aborts in compute shaders on textureGrad, and on a dynamically
+// chosen texture inside any control flow (LLVM 15 with AVX-512): hence no branch, and no return before the last lookup.
+vec4 sample_surface(TextureUse use, SurfacePoint p, vec4 absent) {
+  uint array = min(use.array, kTextureArrays - 1u);
+  vec2 size = vec2(textureSize(scene_textures[array], 0).xy);
   vec2 dx = size * texture_gradient(use, p.uv0_gradient.xy, p.uv1_gradient.xy);
   vec2 dy = size * texture_gradient(use, p.uv0_gradient.zw, p.uv1_gradient.zw);
   float level = 0.5 * log2(clamp(max(dot(dx, dx), dot(dy, dy)), 1e-6, 1e12));
   vec3 where = vec3(texture_uv(use, p.uv0, p.uv1), float(use.layer_texcoord & 0xffffu));
-  return textureLod(scene_textures[use.array], where, level);
+  vec4 texel = textureLod(scene_textures[array], where, level);
+  return use.array == kNone ? absent : texel;
 }
 
 // Linear, with alpha.
 vec4 base_color(SurfacePoint p) {
-  vec4 color = materials[p.material].base_color * p.color;
-  TextureUse use = materials[p.material].base_color_texture;
-  if (use.array != kNone) color *= sample_surface(use, p);
-  return color;
+  return material.base_color * p.color * sample_surface(material.base_color_texture, p, vec4(1.0));
 }
 
-bool is_cut_away(SurfacePoint p) { return base_color(p).a < materials[p.material].alpha_cutoff; }
+// All that the material's textures say about a point.
+struct MaterialPoint {
+  vec4 base;       // linear, with alpha
+  vec3 normal;     // world, unit
+  float metallic, roughness, occlusion;
+  vec3 emitted;
+};
 
 vec3 mapped_normal(SurfacePoint p) {
-  TextureUse use = materials[p.material].normal_texture;
-  if (!kNormalMaps || use.array == kNone) return p.normal;
-  vec3 m = sample_surface(use, p).xyz * 2.0 - 1.0;
-  m.xy *= materials[p.material].normal_scale;
+  vec3 m = sample_surface(material.normal_texture, p, vec4(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0;
+  m.xy *= material.normal_scale;
   vec3 t = safe_normalize(p.tangent.xyz - p.normal * dot(p.normal, p.tangent.xyz), vec3(0.0));
   vec3 b = p.tangent.w * cross(p.normal, t);
   return safe_normalize(m.x * t + m.y * b + m.z * p.normal, p.normal);
 }
 
-Substance substance(SurfacePoint p, vec3 base) {
-  float metallic = materials[p.material].emissive_metallic.a;
-  float roughness = materials[p.material].roughness;
-  TextureUse use = materials[p.material].metallic_roughness_texture;
-  if (kMetallicRoughnessMaps && use.array != kNone) {
-    vec4 m = sample_surface(use, p);
-    metallic *= m.b;
-    roughness *= m.g;
+MaterialPoint material_point(SurfacePoint p) {
+  MaterialPoint m;
+  m.base = base_color(p);
+  m.normal = p.normal;
+  if (kNormalMaps) m.normal = mapped_normal(p);
+  m.metallic = material.emissive_metallic.a;
+  m.roughness = material.roughness;
+  if (kMetallicRoughnessMaps) {
+    vec4 texel = sample_surface(material.metallic_roughness_texture, p, vec4(1.0));
+    m.metallic *= texel.b;
+    m.roughness *= texel.g;
   }
-  return make_substance(base, metallic, roughness);
-}
-
-vec3 emitted(SurfacePoint p) {
-  vec3 e = materials[p.material].emissive_metallic.rgb;
-  TextureUse use = materials[p.material].emissive_texture;
-  return use.array == kNone ? e : e * sample_surface(use, p).rgb;
-}
-
-float occlusion(SurfacePoint p) {
-  TextureUse use = materials[p.material].occlusion_texture;
-  if (!kOcclusionMaps || use.array == kNone) return 1.0;
-  return mix(1.0, sample_surface(use, p).r, materials[p.material].occlusion_strength);
+  m.occlusion = 1.0;
+  if (kOcclusionMaps)
+    m.occlusion = mix(1.0, sample_surface(material.occlusion_texture, p, vec4(1.0)).r, material.occlusion_strength);
+  m.emitted = vec3(0.0);
+  if (kEmissive)
+    m.emitted = material.emissive_metallic.rgb * sample_surface(material.emissive_texture, p, vec4(1.0)).rgb;
+  return m;
 }
 
 vec3 hemisphere(vec3 direction) { return mix(ambient_ground.rgb, ambient_sky.rgb, 0.5 * direction.y + 0.5); }
@@ -71,20 +76,18 @@ vec3 ambient_light(Substance s, vec3 normal, vec3 v) {
   return hemisphere(normal) * s.diffuse + hemisphere(reflect(-v, normal)) * specular;
 }
 
-// Display-linear colour in [0, 1] of point `p` seen from `eye` (relative to the instant's origin); `base` = base_color(p).
-vec3 shade(SurfacePoint p, vec3 base, vec3 eye) {
-  uint flags = materials[p.material].flags;
-  if (kUnlit && (flags & kMaterialUnlit) != 0u) return clamp(base, 0.0, 1.0);
+// Display-linear colour in [0, 1] of point `p` of material `m` seen from `eye` (relative to the instant's origin).
+vec3 shade(SurfacePoint p, MaterialPoint m, vec3 eye) {
+  if (kUnlit && (material.flags & kMaterialUnlit) != 0u) return clamp(m.base.rgb, 0.0, 1.0);
   vec3 v = safe_normalize(eye - p.position, p.normal);
-  vec3 normal = mapped_normal(p);
-  vec3 geometric = p.geometric_normal;
-  if (kDoubleSided && (flags & kMaterialDoubleSided) != 0u && dot(geometric, v) < 0.0) {
+  vec3 normal = m.normal, geometric = p.geometric_normal;
+  if (kDoubleSided && (material.flags & kMaterialDoubleSided) != 0u && dot(geometric, v) < 0.0) {
     geometric = -geometric;
     normal = -normal;
   }
-  Substance s = substance(p, base);
-  vec3 radiance = direct_light(s, p.position, geometric, normal, v) + ambient_light(s, normal, v) * occlusion(p);
-  if (kEmissive) radiance += emitted(p);
+  Substance s = make_substance(m.base.rgb, m.metallic, m.roughness);
+  vec3 radiance = direct_light(s, p.position, geometric, normal, v);
+  radiance += ambient_light(s, normal, v) * m.occlusion + m.emitted;
   return tone_map(radiance * ambient_sky.a);
 }
 

@@ -6,6 +6,29 @@
 #include "shading/shaders/brdf.glsl"
 #include "shading/shaders/features.glsl"
 
+// Where an instance stands: the rows of its 3x4 matrix, relative to the instant's origin. Normals go by the cofactors
+// of its 3x3 part, which need no inverse and no loads of their own.
+struct Stand {
+  vec4 row0, row1, row2;
+};
+
+Stand load_stand(uint instance) {
+  return Stand(transforms[instance].row0, transforms[instance].row1, transforms[instance].row2);
+}
+
+vec3 stand_direction(Stand s, vec3 d) { return vec3(dot(s.row0.xyz, d), dot(s.row1.xyz, d), dot(s.row2.xyz, d)); }
+
+vec3 stand_position(Stand s, vec3 p) { return stand_direction(s, p) + vec3(s.row0.w, s.row1.w, s.row2.w); }
+
+// -1 for a mirroring transform, else +1.
+float stand_side(Stand s) { return dot(s.row0.xyz, cross(s.row1.xyz, s.row2.xyz)) < 0.0 ? -1.0 : 1.0; }
+
+// Not normalised.
+vec3 stand_normal(Stand s, vec3 n) {
+  return stand_side(s) * vec3(dot(cross(s.row1.xyz, s.row2.xyz), n), dot(cross(s.row2.xyz, s.row0.xyz), n),
+                              dot(cross(s.row0.xyz, s.row1.xyz), n));
+}
+
 struct Triangle {
   uint v0, v1, v2;    // in vertices[]
   vec3 a, edge1, edge2;  // first corner and the edges from it, relative to the instant's origin
@@ -25,20 +48,19 @@ struct SurfacePoint {
   vec2 uv0, uv1;
   vec4 uv0_gradient, uv1_gradient;  // ddx, ddy
   vec4 color;
-  uint material;
 };
 
 // `triangle`: in the index buffer / 3.
-Triangle fetch_triangle(uint instance, uint triangle) {
+Triangle fetch_triangle(Stand stand, uint triangle) {
   Triangle t;
   t.v0 = indices[3 * triangle];
   t.v1 = indices[3 * triangle + 1];
   t.v2 = indices[3 * triangle + 2];
   // Edges before the transform: the translation would cost them precision.
   vec3 a = vertex_position(t.v0);
-  t.a = to_relative(instance, a);
-  t.edge1 = direction_to_world(instance, vertex_position(t.v1) - a);
-  t.edge2 = direction_to_world(instance, vertex_position(t.v2) - a);
+  t.a = stand_position(stand, a);
+  t.edge1 = stand_direction(stand, vertex_position(t.v1) - a);
+  t.edge2 = stand_direction(stand, vertex_position(t.v2) - a);
   return t;
 }
 
@@ -81,9 +103,8 @@ void set_uv1(inout SurfacePoint p, Triangle t, TrianglePoint at) {
 }
 
 // What texture lookups need, and no more: alpha tests stop here.
-SurfacePoint texture_point(uint material, Triangle t, TrianglePoint at) {
+SurfacePoint texture_point(Triangle t, TrianglePoint at) {
   SurfacePoint p;
-  p.material = material;
   p.position = t.a + at.weights.x * t.edge1 + at.weights.y * t.edge2;
   set_uv0(p, t, at);
   p.uv1 = vec2(0.0);
@@ -97,10 +118,10 @@ SurfacePoint texture_point(uint material, Triangle t, TrianglePoint at) {
   return p;
 }
 
-SurfacePoint surface_point(uint instance, uint material, Triangle t, TrianglePoint at) {
-  SurfacePoint p = texture_point(material, t, at);
-  float side = is_mirrored(instance) ? -1.0 : 1.0;
-  vec3 interpolated = normal_to_world(instance, interpolate_normal(t, at.weights));
+SurfacePoint surface_point(Stand stand, Triangle t, TrianglePoint at) {
+  SurfacePoint p = texture_point(t, at);
+  float side = stand_side(stand);
+  vec3 interpolated = stand_normal(stand, interpolate_normal(t, at.weights));
   // Scaled, so that neither a crumb's nor a planet's cross product leaves the range of float.
   vec3 reach = max(abs(t.edge1), abs(t.edge2));
   float scale = 1.0 / clamp(max(reach.x, max(reach.y, reach.z)), 1e-18, 1e18);
@@ -111,7 +132,7 @@ SurfacePoint surface_point(uint instance, uint material, Triangle t, TrianglePoi
   p.normal = safe_normalize(interpolated, p.geometric_normal);
   if (kNormalMaps) {
     vec4 tangent = interpolate_tangent(t, at.weights);
-    p.tangent = vec4(direction_to_world(instance, tangent.xyz), side * tangent.w);
+    p.tangent = vec4(stand_direction(stand, tangent.xyz), side * tangent.w);
   }
   return p;
 }

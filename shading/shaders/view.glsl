@@ -4,20 +4,26 @@
 
 #include "shading/shaders/surface.glsl"
 
-layout(set = 3, binding = 0, std140) uniform ViewRecord {
+layout(set = 3, binding = 1, std140) uniform ViewRecord {
   mat4 clip_from_relative;
   vec4 eye;  // relative to the instant's origin
   // The ray through framebuffer position (x, y), in pixels from the upper left: ray_0 + x ray_x + y ray_y, of length 1
   // along the view's axis.
   vec4 ray_0, ray_x, ray_y;
+  vec4 pixel_size;  // xy = of a pixel in clip space
 } view;
 
-// Instance and material come as constants, not through varyings: loads at a uniform address are many times cheaper on
-// the software device.
+// The software device repeats a load from a storage buffer for every sample, but not one of a push constant: what all
+// samples of a draw share comes here.
 layout(push_constant) uniform Draw {
+  Stand stand;
+  vec2 sample_at;  // in the pixel, (0.5, 0.5) = its centre; y down
   uint first_triangle;  // in the index buffer / 3
-  uint instance, material;
+  uint instance;
 } draw;
+
+// Framebuffer position of the sample that a fragment stands for.
+vec2 sample_position(vec4 frag_coord) { return floor(frag_coord.xy) + draw.sample_at; }
 
 // Where the ray through `pixel` meets the triangle's plane (Möller-Trumbore), and the exact derivatives of the weights
 // over whole pixels. Clamped to the triangle: rounding at an edge-on triangle must not reach outside it.

@@ -1,4 +1,5 @@
-// libFuzzer: any bytes as a glTF file. Limits are small, so that memory shows leaks and bombs rather than legal size.
+// libFuzzer: any bytes as a glTF file. Limits are small, so that memory shows leaks and bombs rather than
+// legal size.
 #include <cstddef>
 #include <cstdint>
 
@@ -11,7 +12,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   options.limits.max_texture_bytes = 1 << 20;
   options.limits.max_texture_side = 512;
   options.limits.max_nodes = 10'000;
-  const auto scene = tessera::scene::load_gltf({reinterpret_cast<const std::byte*>(data), size}, "fuzz.glb", {}, options);
+  const auto scene =
+      tessera::scene::load_gltf({reinterpret_cast<const std::byte*>(data), size}, "fuzz.glb", {}, options);
   if (scene.ok()) (*scene)->world_bounds(tessera::kNsPerSecond);
   return 0;
 }

@@ -5,10 +5,13 @@
 namespace tessera::pvs {
 namespace {
 
-scene::VisiblePatch patch(scene::PatchId id, float area) { return {id, {1, 1, area}}; }
+scene::VisiblePatch patch(scene::PatchId id, float area) {
+  return {id, {1, 1, area}};
+}
 
 TEST(Coverage, CountsByArea) {
-  const Coverage c = compare({patch(1, 10), patch(3, 20), patch(8, 5)}, {patch(1, 12), patch(2, 6), patch(8, 6), patch(9, 6)});
+  const Coverage c = compare({patch(1, 10), patch(3, 20), patch(8, 5)},
+                             {patch(1, 12), patch(2, 6), patch(8, 6), patch(9, 6)});
   EXPECT_DOUBLE_EQ(c.seen_area, 30);
   EXPECT_DOUBLE_EQ(c.missed_area, 12);  // 2 and 9, as they were seen
   EXPECT_DOUBLE_EQ(c.extra_area, 20);   // 3, as it was predicted

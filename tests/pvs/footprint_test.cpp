@@ -80,7 +80,8 @@ TEST(Footprint, OfPatchesOfOneAndThreeTriangles) {
 
 TEST(Footprint, OfAnEyeInThePatchIsFinite) {
   const Quad q = quad({-1, 1, 0}, {1, 1, 0}, {-1, -1, 0}, {1, -1, 0});
-  for (const dvec3& eye : {dvec3(0), dvec3(-1, 1, 0), dvec3(0, 1, 0), dvec3(0.5, 0.2, 0), dvec3(0, 0, 1e-300)}) {
+  for (const dvec3& eye :
+       {dvec3(0), dvec3(-1, 1, 0), dvec3(0, 1, 0), dvec3(0.5, 0.2, 0), dvec3(0, 0, 1e-300)}) {
     expect_finite(seen_from(q, eye));
   }
   // The edge passes through the eye: its ends are half a turn apart.

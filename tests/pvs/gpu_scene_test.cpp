@@ -46,7 +46,8 @@ TEST(TextureArrays, MergeTheSmallestIntoTheNearestSizeOfTheirKind) {
   ASSERT_EQ(plan.size(), 4u);
   expect_complete(plan, textures.size());
   const auto is_alone = [&](uint32_t t) {
-    return std::ranges::any_of(plan, [&](const TextureArrayPlan& a) { return a.textures == std::vector<uint32_t>{t}; });
+    return std::ranges::any_of(
+        plan, [&](const TextureArrayPlan& a) { return a.textures == std::vector<uint32_t>{t}; });
   };
   EXPECT_TRUE(is_alone(7) && is_alone(6)) << "the large ones keep their size";
   EXPECT_TRUE(is_alone(8)) << "no other array has its encoding";
@@ -170,7 +171,8 @@ TEST_F(GpuSceneTest, AnInstantHoldsTheWorldMatricesOfItsTime) {
   b.place(quad, m, dmat4(1), true);
   Scene& s = b.scene();
   s.nodes[1].matrix.reset();
-  s.animations.push_back({1, AnimationPath::translation, Interpolation::linear, {0, 1}, {vec4(0), vec4(10, 0, 0, 0)}});
+  s.animations.push_back(
+      {1, AnimationPath::translation, Interpolation::linear, {0, 1}, {vec4(0), vec4(10, 0, 0, 0)}});
   s.animation_length_s = 1;
   const auto gpu_scene = upload(b.finish());
   auto instant = SceneInstant::create(*device_, *gpu_scene);

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <limits>
+#include <set>
 
 namespace tessera::pvs {
 namespace {
@@ -10,9 +12,13 @@ namespace {
 constexpr TimeNs kStart = 5 * kNsPerSecond;
 constexpr DurationNs kFrame = kNsPerSecond / 60;
 
-View client_view() { return {.fov = Fov::symmetric(1.0472f, 16.0f / 9), .width = 960, .height = 540}; }
+View client_view() {
+  return {.fov = Fov::symmetric(1.0472f, 16.0f / 9), .width = 960, .height = 540};
+}
 
-PredictionSettings settings(double horizon_ms = 133.333) { return {.horizon_ns = from_ms(horizon_ms)}; }
+PredictionSettings settings(double horizon_ms = 133.333) {
+  return {.horizon_ns = from_ms(horizon_ms)};
+}
 
 // Moves with `velocity` and turns with `turn` (rad/s, camera axes), a pose a frame up to kStart.
 Pose pose_at(const dvec3& velocity, const dvec3& turn, double seconds) {
@@ -23,7 +29,8 @@ Pose pose_at(const dvec3& velocity, const dvec3& turn, double seconds) {
 
 std::vector<TimedPose> motion(const dvec3& velocity, const dvec3& turn, int poses = 12) {
   std::vector<TimedPose> out;
-  for (int i = 1 - poses; i <= 0; ++i) out.push_back({kStart + i * kFrame, pose_at(velocity, turn, to_seconds(i * kFrame))});
+  for (int i = 1 - poses; i <= 0; ++i)
+    out.push_back({kStart + i * kFrame, pose_at(velocity, turn, to_seconds(i * kFrame))});
   return out;
 }
 
@@ -57,11 +64,13 @@ TEST(Prediction, CoversNowEveryStepAndTheHorizon) {
   const auto views = predict_views(history, kStart, client_view(), settings(120));
   ASSERT_EQ(views.size(), 5u);
   const double ahead_ms[] = {0, 33.333333, 66.666666, 99.999999, 120};
-  for (size_t i = 0; i < views.size(); ++i) expect_pose(views[i].pose, pose_at(velocity, dvec3(0), ahead_ms[i] * 1e-3));
+  for (size_t i = 0; i < views.size(); ++i)
+    expect_pose(views[i].pose, pose_at(velocity, dvec3(0), ahead_ms[i] * 1e-3));
 }
 
 TEST(Prediction, ConstantMotionIsContinuedExactly) {
-  for (const dvec3& turn : {dvec3(0), dvec3(0, 1, 0), dvec3(0, -7, 0), dvec3(0.3, -0.5, 2), dvec3(1e-9, 0, 0)}) {
+  for (const dvec3& turn :
+       {dvec3(0), dvec3(0, 1, 0), dvec3(0, -7, 0), dvec3(0.3, -0.5, 2), dvec3(1e-9, 0, 0)}) {
     for (const dvec3& velocity : {dvec3(0), dvec3(10, 0, 0), dvec3(-1, 2, 0.5)}) {
       for (const int poses : {2, 3, 4, 12}) {
         const auto views = predict_views(motion(velocity, turn, poses), kStart, client_view(), settings());
@@ -75,7 +84,8 @@ TEST(Prediction, ConstantMotionIsContinuedExactly) {
 
 TEST(Prediction, AnOldPoseIsExtrapolatedFromItsOwnTime) {
   const dvec3 velocity(3, 0, 0);
-  const auto views = predict_views(motion(velocity, dvec3(0)), kStart + from_ms(50), client_view(), settings(100));
+  const auto views =
+      predict_views(motion(velocity, dvec3(0)), kStart + from_ms(50), client_view(), settings(100));
   expect_pose(views.front().pose, pose_at(velocity, dvec3(0), 0));
   expect_pose(views[1].pose, pose_at(velocity, dvec3(0), 0.05));
   expect_pose(views.back().pose, pose_at(velocity, dvec3(0), 0.15));
@@ -96,11 +106,25 @@ TEST(Prediction, WithoutPredictionOnlyTheNewestPoseIsSeen) {
 TEST(Prediction, TheFieldGrowsByTheBaseMarginAndPixelsKeepTheirAngle) {
   const View client = client_view();
   const auto views = predict_views(motion(dvec3(0), dvec3(0)), kStart, client, settings());
+  const float pixel = 1 / client.pixels_per_radian();
   for (const View& v : views) {
-    EXPECT_NEAR(v.fov.width_rad(), 1.2f * client.fov.width_rad(), 1e-4);
-    EXPECT_NEAR(v.fov.height_rad(), 1.2f * client.fov.height_rad(), 1e-4);
-    EXPECT_NEAR(v.pixels_per_radian(), client.pixels_per_radian(), 0.01f * client.pixels_per_radian());
+    EXPECT_NEAR(v.fov.width_rad(), 1.2f * client.fov.width_rad(), 2 * pixel);
+    EXPECT_NEAR(v.fov.height_rad(), 1.2f * client.fov.height_rad(), 2 * pixel);
+    EXPECT_NEAR(v.pixels_per_radian(), client.pixels_per_radian(), 1e-4f * client.pixels_per_radian());
   }
+}
+
+TEST(Prediction, TheFirstViewHasTheClientsPixelCentresAndTheOthersItsSamples) {
+  const View client = client_view();
+  const auto views = predict_views(motion(dvec3(0), dvec3(0)), kStart, client, settings());
+  const double pixel = double(client.fov.right - client.fov.left) / client.width;
+  const auto phase = [&](double tangents) { return tangents / pixel - std::round(tangents / pixel); };
+  std::set<int> offsets;  // in eighths of a pixel
+  for (const View& v : views)
+    offsets.insert(static_cast<int>(std::round(8 * phase(v.fov.left - client.fov.left))));
+  EXPECT_NEAR(phase(views[0].fov.left - client.fov.left), 0, 1e-2);
+  EXPECT_NEAR(phase(views[0].fov.up - client.fov.up), 0, 1e-2);
+  EXPECT_EQ(offsets, (std::set<int>{-3, -1, 0, 1, 3}));
 }
 
 TEST(Prediction, NoMarginLeavesTheViewAlone) {
@@ -116,7 +140,7 @@ TEST(Prediction, ATurnWidensItsAxisMoreFurtherAhead) {
   const auto views = predict_views(motion(dvec3(0), {0, 2, 0}), kStart, client_view(), settings());
   for (size_t i = 1; i < views.size(); ++i) {
     EXPECT_GT(views[i].fov.width_rad(), views[i - 1].fov.width_rad());
-    EXPECT_NEAR(views[i].fov.height_rad(), views[i - 1].fov.height_rad(), 1e-4);
+    EXPECT_NEAR(views[i].fov.height_rad(), views[i - 1].fov.height_rad(), 1e-3);
   }
   const auto nod = predict_views(motion(dvec3(0), {2, 0, 0}), kStart, client_view(), settings());
   EXPECT_GT(nod.back().fov.height_rad(), nod.front().fov.height_rad());
@@ -137,8 +161,8 @@ TEST(Prediction, MarginsStayBelowTheirLimits) {
       client.fov = Fov::symmetric(fov, 1);
       const auto views = predict_views(motion(dvec3(0), {rate, rate, rate}), kStart, client, settings(500));
       for (const View& v : views) {
-        EXPECT_LE(v.fov.width_rad(), client.fov.width_rad() + 2 * 0.7f + 1e-4f);
-        EXPECT_GE(v.fov.width_rad(), client.fov.width_rad() - 1e-4f);
+        EXPECT_LE(v.fov.width_rad(), client.fov.width_rad() + 2 * 0.7f + 0.01f);
+        EXPECT_GE(v.fov.width_rad(), client.fov.width_rad() - 0.01f);
       }
     }
   }
@@ -152,7 +176,7 @@ TEST(Prediction, BrokenHistoriesStandStill) {
   };
   auto history = motion({5, 0, 0}, {0, 1, 0});
   expect_still({history.back()}, kStart);
-  expect_still(history, kStart + kNsPerSecond);      // nothing new for a second
+  expect_still(history, kStart + kNsPerSecond);       // nothing new for a second
   expect_still(history, kStart - 10 * kNsPerSecond);  // the clock jumped back
   auto repeated = history;
   repeated.back().time_ns = repeated[repeated.size() - 2].time_ns;
@@ -194,7 +218,8 @@ TEST(Prediction, UnnormalisedAndHostileInputStaysSane) {
   }
   auto scaled = motion({1, 0, 0}, {0, 1, 0});
   for (TimedPose& p : scaled) p.pose.orientation = p.pose.orientation * 37.0;
-  expect_pose(predict_views(scaled, kStart, client_view(), settings()).back().pose, pose_at({1, 0, 0}, {0, 1, 0}, 0.133333));
+  expect_pose(predict_views(scaled, kStart, client_view(), settings()).back().pose,
+              pose_at({1, 0, 0}, {0, 1, 0}, 0.133333));
 }
 
 TEST(Prediction, ExtremeSettingsGiveFewViews) {
@@ -212,7 +237,8 @@ TEST(Prediction, AsymmetricFrustaStayAsymmetric) {
   const auto views = predict_views(motion(dvec3(0), dvec3(0)), kStart, client, settings());
   EXPECT_LT(views[0].fov.left, -0.5f);
   EXPECT_GT(views[0].fov.right, 1.2f);
-  EXPECT_NEAR(std::atan(views[0].fov.right) - std::atan(1.2f), std::atan(-0.5f) - std::atan(views[0].fov.left), 1e-4);
+  EXPECT_NEAR(std::atan(views[0].fov.right) - std::atan(1.2f),
+              std::atan(-0.5f) - std::atan(views[0].fov.left), 2e-3);
 }
 
 }  // namespace

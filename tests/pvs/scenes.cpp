@@ -20,7 +20,8 @@ void make_meshlets(scene::Geometry& g) {
     const auto corner = [&](uint32_t i) { return g.vertices[g.indices[3 * m.first_triangle + i]].position; };
     for (uint32_t i = 0; i < 3 * m.triangle_count; ++i) box.add(corner(i));
     m.center = box.center();
-    for (uint32_t i = 0; i < 3 * m.triangle_count; ++i) m.radius = std::max(m.radius, glm::distance(m.center, corner(i)));
+    for (uint32_t i = 0; i < 3 * m.triangle_count; ++i)
+      m.radius = std::max(m.radius, glm::distance(m.center, corner(i)));
     g.meshlets.push_back(m);
   }
 }
@@ -74,7 +75,8 @@ void SceneBuilder::add_face(scene::Geometry& g, const mat3& axes, uint32_t cuts)
 uint32_t SceneBuilder::box(uint32_t cuts) {
   scene::Geometry g{.name = "box"};
   const vec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
-  for (const mat3& axes : {mat3(x, y, z), mat3(-x, y, -z), mat3(-z, y, x), mat3(z, y, -x), mat3(x, -z, y), mat3(x, z, -y)}) {
+  for (const mat3& axes :
+       {mat3(x, y, z), mat3(-x, y, -z), mat3(-z, y, x), mat3(z, y, -x), mat3(x, -z, y), mat3(x, z, -y)}) {
     add_face(g, axes, cuts);
   }
   return add(std::move(g));
@@ -123,7 +125,10 @@ dmat4 transform(const dvec3& translation, const dvec3& scale, double yaw) {
 }
 
 scene::Texture half_mask(uint32_t size) {
-  scene::Texture t{.name = "half", .width = size, .height = size, .rgba = std::vector<uint8_t>(size_t{4} * size * size, 255)};
+  scene::Texture t{.name = "half",
+                   .width = size,
+                   .height = size,
+                   .rgba = std::vector<uint8_t>(size_t{4} * size * size, 255)};
   for (size_t i = 0; i < size_t{size} * size; ++i) t.rgba[4 * i + 3] = i % size < size / 2 ? 255 : 0;
   t.srgb = true;
   t.wrap_u = t.wrap_v = scene::WrapMode::clamp_to_edge;
@@ -148,9 +153,11 @@ std::shared_ptr<const scene::Scene> make_town(int side, bool with_masks) {
       const dvec3 at(4.0 * (x - side / 2) + hash(4 * i), 0, 4.0 * (z - side / 2) + hash(4 * i + 1));
       const double height = 1 + 4 * hash(4 * i + 2), yaw = 6.28 * hash(4 * i + 3);
       const double mirror = i % 3 == 1 ? -1 : 1;
-      b.place(box, stone, transform(at + dvec3(0, height - 0.13, 0), {0.9 * mirror, height, 0.4 + hash(i)}, yaw));
+      b.place(box, stone,
+              transform(at + dvec3(0, height - 0.13, 0), {0.9 * mirror, height, 0.4 + hash(i)}, yaw));
       if (i % 4 == 0) b.place(panel, cloth, transform(at + dvec3(1.9, 1.1, 0.7), {0.6, 1, 1}, yaw));
-      if (with_masks && i % 4 == 1) b.place(panel, leaf, transform(at + dvec3(1.8, 1.3, 1.2), {0.5 * mirror, 0.8, 1}, yaw));
+      if (with_masks && i % 4 == 1)
+        b.place(panel, leaf, transform(at + dvec3(1.8, 1.3, 1.2), {0.5 * mirror, 0.8, 1}, yaw));
     }
   }
   return b.finish();

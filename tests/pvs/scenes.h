@@ -12,9 +12,11 @@ class SceneBuilder {
  public:
   SceneBuilder();
 
-  // A box from -1 to 1, faces outward, each face cut into `cuts` by `cuts` quads. Meshlets of up to 32 triangles.
+  // A box from -1 to 1, faces outward, each face cut into `cuts` by `cuts` quads. Meshlets of up to 32
+  // triangles.
   uint32_t box(uint32_t cuts);
-  // A quad from -1 to 1 in the plane z = 0 that faces +Z; its texture coordinates run from 0 to 1, v downward.
+  // A quad from -1 to 1 in the plane z = 0 that faces +Z; its texture coordinates run from 0 to 1, v
+  // downward.
   uint32_t quad(uint32_t cuts = 1);
   uint32_t geometry(const std::vector<vec3>& positions, const std::vector<uint32_t>& indices);
   uint32_t material(const scene::Material& material);
@@ -32,7 +34,8 @@ class SceneBuilder {
 
 dmat4 transform(const dvec3& translation, const dvec3& scale = dvec3(1), double yaw = 0);
 
-// A town of boxes of uneven scale, some mirrored, with double-sided panels and masked leaves; nothing coincides.
+// A town of boxes of uneven scale, some mirrored, with double-sided panels and masked leaves; nothing
+// coincides.
 std::shared_ptr<const scene::Scene> make_town(int side, bool with_masks);
 
 // Left half opaque, right half transparent.

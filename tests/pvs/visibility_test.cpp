@@ -9,12 +9,14 @@
 #include <set>
 
 #include "pvs/buckets.h"
+#include "scene/procedural.h"
 #include "scenes.h"
 
 namespace tessera::pvs {
 namespace {
 
-View view_from(const dvec3& eye, const dvec3& at, float fov_y_rad = 1.0f, uint32_t width = 160, uint32_t height = 90) {
+View view_from(const dvec3& eye, const dvec3& at, float fov_y_rad = 1.0f, uint32_t width = 160,
+               uint32_t height = 90) {
   const dvec3 ahead = glm::normalize(at - eye);
   const dvec3 up = std::abs(ahead.y) > 0.99 ? dvec3(0, 0, 1) : dvec3(0, 1, 0);
   return {.pose = {eye, glm::quatLookAt(ahead, up)},
@@ -72,7 +74,8 @@ std::shared_ptr<gpu::Device> VisibilityTest::device_;
 
 size_t differing_pixels(const IdBuffer& a, const IdBuffer& b) {
   size_t n = 0;
-  for (size_t i = 0; i < a.triangle_plus_one.size(); ++i) n += a.triangle_plus_one[i] != b.triangle_plus_one[i];
+  for (size_t i = 0; i < a.triangle_plus_one.size(); ++i)
+    n += a.triangle_plus_one[i] != b.triangle_plus_one[i];
   return n;
 }
 
@@ -120,6 +123,23 @@ TEST_F(VisibilityTest, CullingDoesNotChangeAPixel) {
   }
 }
 
+TEST_F(VisibilityTest, CullingDoesNotChangeWhatIsSeenOfACity) {
+  load(scene::make_city(100'000));
+  const auto everything = make({.frustum_culling = false, .occlusion_culling = false});
+  const auto both = make();
+  const CameraPath path = scene::city_path();
+  uint64_t drawn = 0, all = 0;
+  for (int i = 0; i < 6; ++i) {
+    View view = view_from({0, 0, 0}, {0, 0, -1}, 1.0f, 320, 180);
+    view.pose = path.at(path.poses().front().time_ns + i * path.duration_ns() / 6);
+    instant_->set(0, view.pose.position);
+    EXPECT_EQ(differing_pixels(ids(*everything, view), ids(*both, view)), 0u) << "view " << i;
+    drawn += both->stats().triangles_drawn;
+    all += everything->stats().triangles_drawn;
+  }
+  EXPECT_LT(drawn, all / 2);
+}
+
 TEST_F(VisibilityTest, TheUnionIsWhatTheViewsShow) {
   load(make_town(5, true));
   const auto culled = make();
@@ -163,7 +183,8 @@ TEST_F(VisibilityTest, FootprintsAreTheLargestOverTheEyes) {
   load(b.finish());
   const auto visibility = make();
   const View far = view_from({0, 0, 20}, {0, 0, 0}), near = view_from({0, 0, 10}, {0, 0, 0});
-  const auto want = footprint(scene().geometries[0], scene().geometries[0].patches[0], dmat4(1), {0, 0, 10}, far.pixels_per_radian());
+  const auto want = footprint(scene().geometries[0], scene().geometries[0].patches[0], dmat4(1), {0, 0, 10},
+                              far.pixels_per_radian());
   for (const std::vector<View>& views : {std::vector<View>{far, near}, {near, far}, {far, far, near}}) {
     const auto seen = determine(*visibility, views);
     ASSERT_EQ(seen.size(), 1u);
@@ -193,7 +214,9 @@ TEST_F(VisibilityTest, OcclusionCullingDrawsLess) {
 TEST_F(VisibilityTest, FrustumCullingDrawsLess) {
   SceneBuilder b;
   const uint32_t stone = b.material({}), box = b.box(8);
-  for (int i = 0; i < 32; ++i) b.place(box, stone, transform({10 * std::cos(i * 0.19634954), 0, 10 * std::sin(i * 0.19634954)}, dvec3(0.5)));
+  for (int i = 0; i < 32; ++i)
+    b.place(box, stone,
+            transform({10 * std::cos(i * 0.19634954), 0, 10 * std::sin(i * 0.19634954)}, dvec3(0.5)));
   load(b.finish());
   const auto frustum = make({.frustum_culling = true, .occlusion_culling = false});
   ids(*frustum, view_from({0, 0, 0}, {1, 0, 0}, 0.8f, 90, 90));
@@ -218,7 +241,8 @@ TEST_F(VisibilityTest, FarFromTheOriginNothingIsLost) {
   const uint32_t stone = b.material({});
   const dvec3 far(1e7, -2e6, 5e6);
   const uint32_t box = b.box(4);
-  for (int i = 0; i < 8; ++i) b.place(box, stone, transform(far + dvec3(3 * i - 12, 0, -6), {1, 1.5, 0.7}, i));
+  for (int i = 0; i < 8; ++i)
+    b.place(box, stone, transform(far + dvec3(3 * i - 12, 0, -6), {1, 1.5, 0.7}, i));
   load(b.finish(), far);
   const View view = view_from(far, far + dvec3(0, 0, -1), 1.2f);
   const auto both = make();
@@ -249,7 +273,9 @@ TEST_F(VisibilityTest, IdsAreThoseOfTheTrianglesThatRaysHit) {
         for (uint32_t t = 0; t < g.triangle_count(); ++t) {
           dvec3 p[3];
           for (int c = 0; c < 3; ++c) {
-            p[c] = dvec3(world[instance.node] * glm::dvec4(dvec3(g.vertices[g.indices[3 * t + c]].position), 1)) - view.pose.position;
+            p[c] = dvec3(world[instance.node] *
+                         glm::dvec4(dvec3(g.vertices[g.indices[3 * t + c]].position), 1)) -
+                   view.pose.position;
           }
           const dvec3 n = winding * glm::cross(p[1] - p[0], p[2] - p[0]);
           if (!double_sided && glm::dot(n, ray) >= 0) continue;
@@ -274,7 +300,8 @@ TEST_F(VisibilityTest, BackFacesOfSingleSidedMaterialsAreNotSeen) {
   for (const bool mirrored : {false, true}) {
     for (const bool double_sided : {false, true}) {
       SceneBuilder b;
-      b.place(b.quad(), b.material({.double_sided = double_sided}), transform({0, 0, 0}, {mirrored ? -1.0 : 1.0, 1, 1}));
+      b.place(b.quad(), b.material({.double_sided = double_sided}),
+              transform({0, 0, 0}, {mirrored ? -1.0 : 1.0, 1, 1}));
       load(b.finish());
       const auto visibility = make();
       EXPECT_EQ(covered_pixels(ids(*visibility, view_from({0, 0, 3}, {0, 0, 0}))) > 0, true);
@@ -304,7 +331,8 @@ TEST_F(VisibilityTest, TheAlphaFactorsMultiply) {
       SceneBuilder b;
       const uint32_t quad = b.quad();
       for (auto& v : b.scene().geometries[quad].vertices) v.color = 0x00ffffffu | vertex_alpha << 24;
-      b.place(quad, b.material({.base_color = vec4(1, 1, 1, factor), .alpha_mode = scene::AlphaMode::mask}), dmat4(1));
+      b.place(quad, b.material({.base_color = vec4(1, 1, 1, factor), .alpha_mode = scene::AlphaMode::mask}),
+              dmat4(1));
       load(b.finish());
       const bool visible = factor * float(vertex_alpha) / 255 >= 0.5f;
       EXPECT_EQ(covered_pixels(ids(*make(), view_from({0, 0, 3}, {0, 0, 0}))) > 0, visible);
@@ -393,7 +421,8 @@ TEST_F(VisibilityTest, ImpossibleViewsAreErrors) {
 TEST_F(VisibilityTest, SliversAndDegenerateTrianglesDoNoHarm) {
   SceneBuilder b;
   const uint32_t stone = b.material({.double_sided = true});
-  const std::vector<vec3> points{{-1, 0, 0}, {1, 0, 0}, {0, 1e-7f, 0}, {0, 0, 0}, {0, 0, 0}, {-1, -1, 0}, {1, -1, 0}, {0, 1, 0}};
+  const std::vector<vec3> points{{-1, 0, 0}, {1, 0, 0},   {0, 1e-7f, 0}, {0, 0, 0},
+                                 {0, 0, 0},  {-1, -1, 0}, {1, -1, 0},    {0, 1, 0}};
   b.place(b.geometry(points, {0, 1, 2, 3, 4, 3, 0, 0, 1, 5, 6, 7}), stone, dmat4(1));
   b.place(0, stone, transform({0, 0, -1}, {1, 0, 1}));  // flat
   b.place(0, stone, transform({0, 0, -1}, dvec3(0)));   // a point
@@ -411,7 +440,11 @@ TEST_F(VisibilityTest, AMovingInstanceIsSeenWhereItIs) {
   b.place(b.quad(), b.material({}), dmat4(1), true);
   scene::Scene& s = b.scene();
   s.nodes[0].matrix.reset();
-  s.animations.push_back({0, scene::AnimationPath::translation, scene::Interpolation::linear, {0, 1}, {vec4(0), vec4(100, 0, 0, 0)}});
+  s.animations.push_back({0,
+                          scene::AnimationPath::translation,
+                          scene::Interpolation::linear,
+                          {0, 1},
+                          {vec4(0), vec4(100, 0, 0, 0)}});
   s.animation_length_s = 1;
   load(b.finish());
   const auto both = make();

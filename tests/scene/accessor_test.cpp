@@ -1,5 +1,5 @@
-// Every component type, normalised or not, tight or strided, dense, sparse, or sparse over nothing, against values
-// computed here.
+// Every component type, normalised or not, tight or strided, dense, sparse, or sparse over nothing, against
+// values computed here.
 #include "scene/gltf/accessor.h"
 
 #include <gtest/gtest.h>
@@ -20,9 +20,12 @@ struct TypeName {
   double lowest, highest;
   size_t size;
 };
-constexpr TypeName kTypes[] = {{5120, 127, -128, 127, 1},      {5121, 255, 0, 255, 1},
-                               {5122, 32767, -32768, 32767, 2}, {5123, 65535, 0, 65535, 2},
-                               {5125, 4294967295.0, 0, 4294967295.0, 4}, {5126, 0, -1e30, 1e30, 4}};
+constexpr TypeName kTypes[] = {{5120, 127, -128, 127, 1},
+                               {5121, 255, 0, 255, 1},
+                               {5122, 32767, -32768, 32767, 2},
+                               {5123, 65535, 0, 65535, 2},
+                               {5125, 4294967295.0, 0, 4294967295.0, 4},
+                               {5126, 0, -1e30, 1e30, 4}};
 
 // Values that reach both ends of the type's range.
 double raw_value(const TypeName& type, size_t element, int component) {
@@ -36,12 +39,23 @@ void put(std::vector<uint8_t>& out, const TypeName& type, double value) {
     out.insert(out.end(), bytes, bytes + sizeof v);
   };
   switch (type.component_type) {
-    case 5120: push(static_cast<int8_t>(value)); break;
-    case 5121: push(static_cast<uint8_t>(value)); break;
-    case 5122: push(static_cast<int16_t>(value)); break;
-    case 5123: push(static_cast<uint16_t>(value)); break;
-    case 5125: push(static_cast<uint32_t>(value)); break;
-    default: push(static_cast<float>(value));
+    case 5120:
+      push(static_cast<int8_t>(value));
+      break;
+    case 5121:
+      push(static_cast<uint8_t>(value));
+      break;
+    case 5122:
+      push(static_cast<int16_t>(value));
+      break;
+    case 5123:
+      push(static_cast<uint16_t>(value));
+      break;
+    case 5125:
+      push(static_cast<uint32_t>(value));
+      break;
+    default:
+      push(static_cast<float>(value));
   }
 }
 
@@ -58,7 +72,9 @@ struct Case {
   Storage storage;
 };
 
-bool is_override(size_t element) { return element == 2 || element == 5; }
+bool is_override(size_t element) {
+  return element == 2 || element == 5;
+}
 
 // In sparse storage the dense elements hold garbage where overrides are.
 GltfBuilder make_file(const Case& c) {
@@ -87,8 +103,9 @@ GltfBuilder make_file(const Case& c) {
 }
 
 void check(const Case& c) {
-  SCOPED_TRACE(absl::StrFormat("type %d, %d components, normalized %d, stride %d, storage %d", c.type.component_type,
-                               c.components, c.normalized, c.stride, static_cast<int>(c.storage)));
+  SCOPED_TRACE(absl::StrFormat("type %d, %d components, normalized %d, stride %d, storage %d",
+                               c.type.component_type, c.components, c.normalized, c.stride,
+                               static_cast<int>(c.storage)));
   const std::vector<std::byte> file = make_file(c).glb();
   ImportNotes notes;
   const auto document = Document::open(file, "test.glb", {}, {}, notes);

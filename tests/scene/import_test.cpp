@@ -30,10 +30,11 @@ TEST(Import, SampleFile) {
   EXPECT_EQ(scene->materials[0].emissive, vec3(0.5f, 0, 0));
   const Features& f = scene->features;
   EXPECT_TRUE(f.normal_maps && f.emissive && f.rigid_animation && f.mirrored_instances);
-  EXPECT_FALSE(f.alpha_mask || f.unlit || f.occlusion_maps || f.vertex_colors || f.second_texcoord || f.double_sided);
+  EXPECT_FALSE(f.alpha_mask || f.unlit || f.occlusion_maps || f.vertex_colors || f.second_texcoord ||
+               f.double_sided);
   EXPECT_EQ(f.spot_lights, 1u);
-  EXPECT_FLOAT_EQ(f.largest_triangle_m2, 2);     // the root scales by 2
-  EXPECT_FLOAT_EQ(f.most_slanted_triangle, 2);   // diagonal sqrt(8) / height sqrt(2)
+  EXPECT_FLOAT_EQ(f.largest_triangle_m2, 2);    // the root scales by 2
+  EXPECT_FLOAT_EQ(f.most_slanted_triangle, 2);  // diagonal sqrt(8) / height sqrt(2)
   const Aabb box = scene->world_bounds(0);
   EXPECT_EQ(box.min, vec3(0));
   EXPECT_EQ(box.max, vec3(10, 2, 0));  // node b: x from 2 * (5 - 1) to 10
@@ -73,15 +74,17 @@ TEST(Import, MaterialExtensionsAndAlpha) {
   EXPECT_TRUE(f.unlit && f.alpha_mask && f.double_sided && f.occlusion_maps && f.second_texcoord);
 }
 
-// Tuples: offset, rotation, scale; where (1, 0) and (0, 1) go. By the extension's own example, a rotation by 90 degrees
-// takes u to -v and v to u.
+// Tuples: offset, rotation, scale; where (1, 0) and (0, 1) go. By the extension's own example, a rotation by
+// 90 degrees takes u to -v and v to u.
 TEST(Import, TextureTransform) {
   GltfBuilder file = sample_file();
   file.document["materials"][0]["normalTexture"]["extensions"]["KHR_texture_transform"] = {
       {"offset", {0, 1}}, {"rotation", 1.57079632679}, {"scale", {0.5, 0.25}}, {"texCoord", 1}};
   const auto scene = must_load(file);
   const TextureRef& ref = scene->materials[0].normal_texture;
-  const auto map = [&](float u, float v) { return u * ref.uv_from_texcoord[0] + v * ref.uv_from_texcoord[1] + ref.uv_from_texcoord[2]; };
+  const auto map = [&](float u, float v) {
+    return u * ref.uv_from_texcoord[0] + v * ref.uv_from_texcoord[1] + ref.uv_from_texcoord[2];
+  };
   EXPECT_EQ(ref.texcoord, 1u);
   EXPECT_NEAR(glm::distance(map(0, 0), vec2(0, 1)), 0, 1e-6);
   EXPECT_NEAR(glm::distance(map(1, 0), vec2(0, 0.5f)), 0, 1e-6);
@@ -121,13 +124,18 @@ TEST(Import, PrimitiveWithoutMaterialGetsTheDefault) {
 TEST(Import, StripsFansAndLines) {
   for (const auto& [mode, triangles] : {std::pair(4, 1), std::pair(5, 2), std::pair(6, 2)}) {
     GltfBuilder file;
-    file.add_floats(mode == 5 ? std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0} : std::vector<float>{0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}, 3);
-    file.append("meshes", {{"primitives", {{{"attributes", {{"POSITION", 0}}}, {"mode", mode}}, {{"attributes", {{"POSITION", 0}}}, {"mode", 1}}}}});
+    file.add_floats(mode == 5 ? std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0}
+                              : std::vector<float>{0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0},
+                    3);
+    file.append("meshes", {{"primitives",
+                            {{{"attributes", {{"POSITION", 0}}}, {"mode", mode}},
+                             {{"attributes", {{"POSITION", 0}}}, {"mode", 1}}}}});
     file.append("nodes", {{"mesh", 0}});
     ImportNotes notes;
     const auto scene = must_load(file, &notes);
     ASSERT_EQ(scene->triangle_count, static_cast<uint32_t>(triangles)) << mode;
-    for (const Vertex& v : scene->geometries[0].vertices) EXPECT_EQ(v.normal, vec3(0, 0, 1)) << mode;  // flat; winding kept
+    for (const Vertex& v : scene->geometries[0].vertices)
+      EXPECT_EQ(v.normal, vec3(0, 0, 1)) << mode;  // flat; winding kept
     EXPECT_THAT(notes.notes, Contains(HasSubstr("1 primitives of points or lines")));
   }
 }
@@ -164,7 +172,8 @@ TEST(Import, IgnoredThingsAreNoted) {
   GltfBuilder file = sample_file();
   file.document["skins"] = {{{"joints", "hostile"}}};
   file.document["extensionsUsed"] = {"KHR_materials_clearcoat"};
-  file.document["materials"][0]["extensions"]["KHR_materials_clearcoat"] = {{"clearcoatTexture", {{"index", 99}}}};
+  file.document["materials"][0]["extensions"]["KHR_materials_clearcoat"] = {
+      {"clearcoatTexture", {{"index", 99}}}};
   file.document["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", 99}}};
   ImportNotes notes;
   ASSERT_TRUE(must_load(file, &notes));
@@ -176,7 +185,9 @@ TEST(Import, IgnoredThingsAreNoted) {
 TEST(Import, DataUriBuffer) {
   GltfBuilder file;
   // Three float positions: (0,0,0) (1,0,0) (0,1,0).
-  file.document["buffers"] = {{{"byteLength", 36}, {"uri", "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}}};
+  file.document["buffers"] = {
+      {{"byteLength", 36},
+       {"uri", "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}}};
   file.document["bufferViews"] = {{{"buffer", 0}, {"byteLength", 36}}};
   file.add_accessor(0, 5126, 3, "VEC3");
   file.append("meshes", {{"primitives", {{{"attributes", {{"POSITION", 0}}}}}}});
@@ -209,8 +220,10 @@ TEST(Import, MirroredCoordinatesDoubleTheVerticesBetween) {
   const Geometry& g = scene->geometries[0];
   EXPECT_EQ(g.vertices.size(), 8u);
   for (size_t i = 0; i < g.indices.size(); ++i) {
-    const float middle = (g.vertices[g.indices[i - i % 3]].position.x + g.vertices[g.indices[i - i % 3 + 1]].position.x +
-                          g.vertices[g.indices[i - i % 3 + 2]].position.x) / 3;
+    const float middle =
+        (g.vertices[g.indices[i - i % 3]].position.x + g.vertices[g.indices[i - i % 3 + 1]].position.x +
+         g.vertices[g.indices[i - i % 3 + 2]].position.x) /
+        3;
     const vec4 expected = middle < 1 ? vec4(1, 0, 0, 1) : vec4(-1, 0, 0, -1);
     EXPECT_NEAR(glm::distance(g.vertices[g.indices[i]].tangent, expected), 0, 1e-6);
   }

@@ -27,7 +27,8 @@ SourceMesh grid(uint32_t columns, uint32_t rows, float width, float height) {
   SourceMesh mesh;
   for (uint32_t j = 0; j <= rows; ++j) {
     for (uint32_t i = 0; i <= columns; ++i) {
-      const vec2 uv(static_cast<float>(i) / static_cast<float>(columns), static_cast<float>(j) / static_cast<float>(rows));
+      const vec2 uv(static_cast<float>(i) / static_cast<float>(columns),
+                    static_cast<float>(j) / static_cast<float>(rows));
       mesh.vertices.push_back(vertex_at(vec3(uv.x * width, uv.y * height, 0), uv));
     }
   }
@@ -40,7 +41,8 @@ SourceMesh grid(uint32_t columns, uint32_t rows, float width, float height) {
   return mesh;
 }
 
-// Triangles with random corners that share many of their edges, and seams: some vertices are doubled with other uvs.
+// Triangles with random corners that share many of their edges, and seams: some vertices are doubled with
+// other uvs.
 SourceMesh random_mesh(uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> shift(-0.4f, 0.4f), size(0.3f, 40);
@@ -57,12 +59,15 @@ SourceMesh random_mesh(uint32_t seed) {
 }
 
 using Key = std::array<float, 3>;
-Key key_of(const vec3& p) { return {p.x, p.y, p.z}; }
+Key key_of(const vec3& p) {
+  return {p.x, p.y, p.z};
+}
 
 double area_of(const std::vector<Vertex>& vertices, const std::vector<uint32_t>& indices) {
   double area = 0;
   for (size_t i = 0; i < indices.size(); i += 3) {
-    const dvec3 a(vertices[indices[i]].position), b(vertices[indices[i + 1]].position), c(vertices[indices[i + 2]].position);
+    const dvec3 a(vertices[indices[i]].position), b(vertices[indices[i + 1]].position),
+        c(vertices[indices[i + 2]].position);
     area += 0.5 * glm::length(glm::cross(b - a, c - a));
   }
   return area;
@@ -84,7 +89,8 @@ std::vector<std::pair<Key, Key>> boundary(const SourceMesh& mesh) {
 }
 
 double length_of(const std::pair<Key, Key>& edge) {
-  return std::hypot(double(edge.first[0]) - edge.second[0], double(edge.first[1]) - edge.second[1], double(edge.first[2]) - edge.second[2]);
+  return std::hypot(double(edge.first[0]) - edge.second[0], double(edge.first[1]) - edge.second[1],
+                    double(edge.first[2]) - edge.second[2]);
 }
 
 TEST(Split, KeepsAreaAndBoundaryAndEndsBelowTheLimit) {
@@ -103,7 +109,8 @@ TEST(Split, KeepsAreaAndBoundaryAndEndsBelowTheLimit) {
     for (const auto& edge : boundary(mesh)) border_after += length_of(edge);
     EXPECT_NEAR(border_after, border, 1e-5 * border) << "seed " << seed;
     for (size_t i = 0; i < mesh.indices.size(); ++i) {
-      const dvec3 a(mesh.vertices[mesh.indices[i]].position), b(mesh.vertices[mesh.indices[i - i % 3 + (i + 1) % 3]].position);
+      const dvec3 a(mesh.vertices[mesh.indices[i]].position),
+          b(mesh.vertices[mesh.indices[i - i % 3 + (i + 1) % 3]].position);
       EXPECT_LE(glm::length(mesh.scale * (a - b)), 0.9);
     }
   }
@@ -156,8 +163,10 @@ Shares shares_of(const Geometry& g) {
   return shares;
 }
 
-// Triangles as rotated so that the smallest key comes first: equal if they are the same with the same winding.
-std::multiset<std::array<Key, 3>> triangles_of(const std::vector<Vertex>& vertices, const std::vector<uint32_t>& indices) {
+// Triangles as rotated so that the smallest key comes first: equal if they are the same with the same
+// winding.
+std::multiset<std::array<Key, 3>> triangles_of(const std::vector<Vertex>& vertices,
+                                               const std::vector<uint32_t>& indices) {
   std::multiset<std::array<Key, 3>> all;
   for (size_t i = 0; i < indices.size(); i += 3) {
     std::array<Key, 3> t;
@@ -174,7 +183,8 @@ void expect_corners_fit(const Geometry& g, const Patch& patch) {
   for (uint32_t t = 0; t < patch.triangle_count; ++t) {
     for (uint32_t k = 0; k < 3; ++k) {
       const vec2 corner = patch_corner(patch.triangle_count, t, k);
-      const auto [found, is_new] = place.try_emplace(g.indices[3 * (patch.first_triangle + t) + k], corner.x, corner.y);
+      const auto [found, is_new] =
+          place.try_emplace(g.indices[3 * (patch.first_triangle + t) + k], corner.x, corner.y);
       if (!is_new) {
         EXPECT_EQ(found->second, std::pair(corner.x, corner.y));
       }
@@ -244,7 +254,8 @@ TEST(Patches, GridBecomesItsQuads) {
 
 TEST(Patches, FewStayAloneOnIrregularSurfaces) {
   SourceMesh sphere;  // an octahedron, split to 2048 triangles
-  for (const vec3& p : {vec3(1, 0, 0), vec3(-1, 0, 0), vec3(0, 1, 0), vec3(0, -1, 0), vec3(0, 0, 1), vec3(0, 0, -1)}) {
+  for (const vec3& p :
+       {vec3(1, 0, 0), vec3(-1, 0, 0), vec3(0, 1, 0), vec3(0, -1, 0), vec3(0, 0, 1), vec3(0, 0, -1)}) {
     sphere.vertices.push_back(vertex_at(p));
   }
   sphere.indices = {0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4, 2, 0, 5, 1, 2, 5, 3, 1, 5, 0, 3, 5};

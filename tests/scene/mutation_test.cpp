@@ -1,5 +1,5 @@
-// A valid file with random bytes changed, cut, or repeated, and with random JSON values replaced, must be loaded or
-// refused, and never crash. What loads must be consistent.
+// A valid file with random bytes changed, cut, or repeated, and with random JSON values replaced, must be
+// loaded or refused, and never crash. What loads must be consistent.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,14 +13,16 @@ namespace {
 void expect_consistent(const Scene& scene) {
   for (const Geometry& g : scene.geometries) {
     for (const uint32_t i : g.indices) ASSERT_LT(i, g.vertices.size());
-    for (const Vertex& v : g.vertices) ASSERT_TRUE(std::isfinite(v.position.x) && std::isfinite(v.normal.x) && std::isfinite(v.tangent.x));
+    for (const Vertex& v : g.vertices)
+      ASSERT_TRUE(std::isfinite(v.position.x) && std::isfinite(v.normal.x) && std::isfinite(v.tangent.x));
   }
   for (const Instance& i : scene.instances) {
     ASSERT_LT(i.geometry, scene.geometries.size());
     ASSERT_LT(i.material, scene.materials.size());
   }
   for (const Material& m : scene.materials) {
-    ASSERT_TRUE(m.base_color_texture.texture == kNone || m.base_color_texture.texture < scene.textures.size());
+    ASSERT_TRUE(m.base_color_texture.texture == kNone ||
+                m.base_color_texture.texture < scene.textures.size());
   }
   for (const dmat4& m : scene.node_transforms(from_seconds(0.7))) ASSERT_FALSE(std::isnan(m[0][0]));
 }
@@ -51,10 +53,17 @@ TEST(Mutation, Bytes) {
     for (uint32_t n = 1 + random() % 4; n > 0; --n) {
       const size_t at = random() % file.size();
       switch (random() % 4) {
-        case 0: file[at] = static_cast<std::byte>(random()); break;
-        case 1: file[at] ^= static_cast<std::byte>(1u << random() % 8); break;
-        case 2: file.erase(file.begin() + static_cast<ptrdiff_t>(at)); break;
-        default: file.insert(file.begin() + static_cast<ptrdiff_t>(at), static_cast<std::byte>(random() % 128));
+        case 0:
+          file[at] = static_cast<std::byte>(random());
+          break;
+        case 1:
+          file[at] ^= static_cast<std::byte>(1u << random() % 8);
+          break;
+        case 2:
+          file.erase(file.begin() + static_cast<ptrdiff_t>(at));
+          break;
+        default:
+          file.insert(file.begin() + static_cast<ptrdiff_t>(at), static_cast<std::byte>(random() % 128));
       }
     }
     ASSERT_NO_FATAL_FAILURE(load_and_check(file, loaded)) << "round " << round;
@@ -64,18 +73,30 @@ TEST(Mutation, Bytes) {
 
 json random_value(std::mt19937& random) {
   switch (random() % 12) {
-    case 0: return nullptr;
-    case 1: return -1;
-    case 2: return random() % 8;
-    case 3: return 4294967295u;
-    case 4: return 18446744073709551615ull;
-    case 5: return 1e308;
-    case 6: return 0.5;
-    case 7: return "MASK";
-    case 8: return json::array({0, 1, 2});
-    case 9: return json::object();
-    case 10: return true;
-    default: return 5121 + static_cast<int>(random() % 6);
+    case 0:
+      return nullptr;
+    case 1:
+      return -1;
+    case 2:
+      return random() % 8;
+    case 3:
+      return 4294967295u;
+    case 4:
+      return 18446744073709551615ull;
+    case 5:
+      return 1e308;
+    case 6:
+      return 0.5;
+    case 7:
+      return "MASK";
+    case 8:
+      return json::array({0, 1, 2});
+    case 9:
+      return json::object();
+    case 10:
+      return true;
+    default:
+      return 5121 + static_cast<int>(random() % 6);
   }
 }
 

@@ -19,7 +19,8 @@ void expect_valid(const Scene& scene) {
     }
     // Shading normals agree with the winding.
     for (size_t i = 0; i < g.indices.size(); i += 3) {
-      const Vertex &a = g.vertices[g.indices[i]], &b = g.vertices[g.indices[i + 1]], &c = g.vertices[g.indices[i + 2]];
+      const Vertex &a = g.vertices[g.indices[i]], &b = g.vertices[g.indices[i + 1]],
+                   &c = g.vertices[g.indices[i + 2]];
       const vec3 face = glm::cross(b.position - a.position, c.position - a.position);
       ASSERT_GT(glm::dot(face, a.normal + b.normal + c.normal), 0) << g.name;
     }
@@ -88,12 +89,13 @@ TEST(Paths, AreSmoothWalksInsideTheirScenes) {
   for (const std::string name : {"gallery", "city"}) {
     const auto path = load_path(name);
     ASSERT_TRUE(path.ok());
-    const Aabb box = (*load_scene(name == "city" ? "city:50000" : name))->world_bounds(0);
+    const Aabb box = (*load_scene(name == "city" ? "city:200000" : name))->world_bounds(0);
     EXPECT_GE(path->duration_ns(), from_seconds(20));
     const std::vector<TimedPose>& poses = path->poses();
     for (size_t i = 0; i < poses.size(); ++i) {
       const dvec3& p = poses[i].pose.position;
-      EXPECT_TRUE(p.x > box.min.x && p.x < box.max.x && p.z > box.min.z && p.z < box.max.z && p.y > 1.5 && p.y < 1.8);
+      EXPECT_TRUE(p.x > box.min.x && p.x < box.max.x && p.z > box.min.z && p.z < box.max.z && p.y > 1.5 &&
+                  p.y < 1.8);
       EXPECT_NEAR(glm::length(poses[i].pose.orientation), 1, 1e-9);
       if (i == 0) continue;
       const double dt = to_seconds(poses[i].time_ns - poses[i - 1].time_ns);
@@ -108,7 +110,8 @@ TEST(Paths, AreSmoothWalksInsideTheirScenes) {
 TEST(Specs, NamesAndErrors) {
   EXPECT_TRUE(load_scene("gallery:0").ok());
   EXPECT_EQ((*load_scene("gallery:0"))->triangle_count, make_gallery(0)->triangle_count);
-  for (const char* wrong : {"gallery:3", "gallery:", "gallery:-1", "city:x", "city:500000001", "castle", "missing.glb"}) {
+  for (const char* wrong :
+       {"gallery:3", "gallery:", "gallery:-1", "city:x", "city:500000001", "castle", "missing.glb"}) {
     EXPECT_FALSE(load_scene(wrong).ok()) << wrong;
   }
   EXPECT_FALSE(load_path("missing.csv").ok());

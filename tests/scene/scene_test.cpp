@@ -49,17 +49,21 @@ class Animated : public testing::Test {
     scene_.nodes[1].translation = dvec3(0, 0, 1);
     scene_.animation_length_s = 4;
   }
-  void add(AnimationPath path, Interpolation interpolation, std::vector<double> times, std::vector<vec4> values) {
+  void add(AnimationPath path, Interpolation interpolation, std::vector<double> times,
+           std::vector<vec4> values) {
     scene_.animations.push_back({0, path, interpolation, std::move(times), std::move(values)});
   }
   dvec3 parent_at(double t) const { return dvec3(scene_.node_transforms(from_seconds(t))[0][3]); }
   dvec3 child_at(double t) const { return dvec3(scene_.node_transforms(from_seconds(t))[1][3]); }
-  static void expect_near(const dvec3& a, const dvec3& b) { EXPECT_LT(glm::distance(a, b), 1e-6) << a.x << " " << a.y << " " << a.z; }
+  static void expect_near(const dvec3& a, const dvec3& b) {
+    EXPECT_LT(glm::distance(a, b), 1e-6) << a.x << " " << a.y << " " << a.z;
+  }
   Scene scene_;
 };
 
 TEST_F(Animated, LinearClampsAndLoops) {
-  add(AnimationPath::translation, Interpolation::linear, {1, 2, 3}, {vec4(0), vec4(2, 0, 0, 0), vec4(2, 4, 0, 0)});
+  add(AnimationPath::translation, Interpolation::linear, {1, 2, 3},
+      {vec4(0), vec4(2, 0, 0, 0), vec4(2, 4, 0, 0)});
   expect_near(parent_at(0), dvec3(0));
   expect_near(parent_at(1.25), dvec3(0.5, 0, 0));
   expect_near(parent_at(2.5), dvec3(2, 2, 0));

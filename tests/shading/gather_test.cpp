@@ -213,10 +213,11 @@ TEST(Gather, MatchesTheReferencePicture) {
   view.fov = {-t, t, -t, t};
   const ReferenceImage truth = render(world, view, {.samples = 1});
   double error = 0;
-  for (uint32_t y = 0; y < 64; ++y)
-    for (uint32_t x = 0; x < 64; ++x)
+  // But for the border, where the pixel's centre lies on the very edge of the square.
+  for (uint32_t y = 1; y < 63; ++y)
+    for (uint32_t x = 1; x < 63; ++x)
       for (int c = 0; c < 3; ++c) error += std::abs(r.atlas.at(x, 63 - y)[c] - truth.color.at(x, y)[c]);
-  EXPECT_LT(error / (3 * 64 * 64), 0.7);
+  EXPECT_LT(error / (3 * 62 * 62), 0.7);
 }
 
 TEST(Gather, SingleColorsComeInTheOrderOfPlacements) {
@@ -237,8 +238,13 @@ TEST(Gather, AnEmptyLayoutDispatchesNothing) {
   SceneBuilder b;
   b.instance(b.patch(2), b.material({}));
   const World world = make_world(b.build());
+  const auto gather = Gather::create(device(), *world.gpu_scene, *world.lighting, {.width = 16, .height = 16});
+  ASSERT_TRUE(gather.ok());
   const uint64_t draws = device().draws_recorded(), dispatches = device().dispatches_recorded();
-  EXPECT_EQ(gather(world, {}, {}, {.width = 16, .height = 16}).stats.samples, 0u);
+  gpu::Commands commands = device().begin();
+  ASSERT_TRUE((*gather)->record(commands, *world.instant, {}, {}).ok());
+  ASSERT_TRUE(device().run(std::move(commands)).ok());
+  EXPECT_EQ((*gather)->stats().samples, 0u);
   EXPECT_EQ(device().draws_recorded(), draws);
   EXPECT_EQ(device().dispatches_recorded(), dispatches);
 }

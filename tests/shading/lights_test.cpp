@@ -28,7 +28,7 @@ TEST(LightPlan, OrdersByRoleAndStrength) {
   b.light(light(LightType::directional, 3), {}, {0, -1, 0});
   b.scene().lights.push_back(light(LightType::point, 7));  // no node carries it
   const LightPlan plan = plan_lights(b.scene(), true, 1);
-  EXPECT_THAT(plan.order, testing::ElementsAre(4, 2, 3, 1, 0));
+  EXPECT_THAT(plan.order, testing::ElementsAre(4, 2, 3, 0, 1));
   EXPECT_EQ(plan.directional, 2u);
   EXPECT_EQ(plan.sun_shadows, 1u);
   EXPECT_EQ(plan.spot_shadows, 1u);
