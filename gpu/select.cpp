@@ -1,4 +1,5 @@
 // The instance, and the choice among its devices.
+#include <cstdlib>
 #include <algorithm>
 #include <charconv>
 #include <optional>
@@ -88,9 +89,15 @@ std::optional<size_t> find_device(const std::vector<vk::raii::PhysicalDevice>& d
   return best;
 }
 
+// Mesa's software device (22.3, LLVM 15) crashes in its 8-bit texture filters when a compute shader chooses a texture at
+// run time; its float filters are sound, and more exact. The variable must stand before the driver is loaded; whoever has
+// set it keeps their value.
+void avoid_broken_software_filters() { setenv("GALLIVM_PERF", "no_aos_sampling", /*overwrite=*/0); }
+
 }  // namespace
 
 StatusOr<std::unique_ptr<Instance>> create_instance(const DeviceOptions& options) {
+  avoid_broken_software_filters();
   auto result = std::make_unique<Instance>();
   const vk::ApplicationInfo application("tessera", 1, nullptr, 0, VK_API_VERSION_1_3);
   vk::InstanceCreateInfo create({}, &application);

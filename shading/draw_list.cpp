@@ -13,7 +13,8 @@ gpu::Cull cull_of(const scene::Material& material, const dmat4& transform, bool 
 void append(std::vector<DrawRange>& ranges, const DrawRange& range) {
   if (!ranges.empty()) {
     DrawRange& last = ranges.back();
-    if (last.instance == range.instance && last.first_triangle + last.triangle_count == range.first_triangle) {
+    if (last.instance == range.instance &&
+        last.first_triangle + last.triangle_count == range.first_triangle) {
       last.triangle_count += range.triangle_count;
       return;
     }
@@ -36,7 +37,8 @@ WorldSphere transform_sphere(const dmat4& transform, vec3 center, float radius) 
 Frustum::Frustum(const mat4& clip_from_relative, const dvec3& origin, bool ignore_depth) : origin_(origin) {
   const dmat4 rows = glm::transpose(dmat4(clip_from_relative));
   planes_ = {rows[3] + rows[0], rows[3] - rows[0], rows[3] + rows[1], rows[3] - rows[1]};
-  if (!ignore_depth) planes_.push_back(rows[3] - rows[2]);  // reversed depth: the near plane; the far one is at infinity
+  if (!ignore_depth)
+    planes_.push_back(rows[3] - rows[2]);  // reversed depth: the near plane; the far one is at infinity
   for (glm::dvec4& plane : planes_) plane /= std::max(glm::length(dvec3(plane)), 1e-300);
 }
 
@@ -51,8 +53,8 @@ Frustum::Side Frustum::classify(const WorldSphere& sphere) const {
   return side;
 }
 
-DrawList build_draw_list(const scene::GpuScene& gpu_scene, const scene::SceneInstant& instant, const Frustum& frustum,
-                         bool both_sides) {
+DrawList build_draw_list(const scene::GpuScene& gpu_scene, const scene::SceneInstant& instant,
+                         const Frustum& frustum, bool both_sides) {
   const scene::Scene& scene = gpu_scene.scene();
   DrawList list;
   for (uint32_t i = 0; i < scene.instances.size(); ++i) {
@@ -73,7 +75,8 @@ DrawList build_draw_list(const scene::GpuScene& gpu_scene, const scene::SceneIns
       continue;
     }
     for (const scene::Meshlet& meshlet : geometry.meshlets)
-      if (frustum.classify(transform_sphere(transform, meshlet.center, meshlet.radius)) != Frustum::Side::outside)
+      if (frustum.classify(transform_sphere(transform, meshlet.center, meshlet.radius)) !=
+          Frustum::Side::outside)
         append(ranges, {i, first + meshlet.first_triangle, meshlet.triangle_count, cull});
   }
   return list;

@@ -44,8 +44,8 @@ class Frustum {
 };
 
 // The ranges that a frustum may see. `both_sides`: back faces are drawn as well (shadow casters).
-DrawList build_draw_list(const scene::GpuScene& scene, const scene::SceneInstant& instant, const Frustum& frustum,
-                         bool both_sides);
+DrawList build_draw_list(const scene::GpuScene& scene, const scene::SceneInstant& instant,
+                         const Frustum& frustum, bool both_sides);
 
 // One draw a range, after `before_draw(range)` has bound and pushed what it needs, culling included.
 template <class BeforeDraw>

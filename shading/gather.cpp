@@ -29,9 +29,12 @@ struct PassPush {
 
 uint64_t raster_from_texels(GatherPath path) {
   switch (path) {
-    case GatherPath::compute: return ~uint64_t{0};
-    case GatherPath::raster: return 0;
-    case GatherPath::automatic: break;
+    case GatherPath::compute:
+      return ~uint64_t{0};
+    case GatherPath::raster:
+      return 0;
+    case GatherPath::automatic:
+      break;
   }
   return 16 * 16;
 }
@@ -67,8 +70,8 @@ Status Gather::Impl::create() {
                                         {kColors, gpu::BindingKind::storage_buffer},
                                         {kAtlas, gpu::BindingKind::storage_image}};
   if (settings.width == 0 || settings.height == 0 || settings.width > 65536 || settings.height > 65536)
-    return absl::InvalidArgumentError(
-        absl::StrFormat("gather: atlas of %ux%u texels, each side must be 1..65536", settings.width, settings.height));
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "gather: atlas of %ux%u texels, each side must be 1..65536", settings.width, settings.height));
   TESSERA_ASSIGN_OR_RETURN(groups, MaterialGroups::create(device, scene, kBindings));
   const gpu::ImageDesc desc{
       .width = settings.width, .height = settings.height, .format = kAtlasFormat, .storage = true};
@@ -83,8 +86,8 @@ Status Gather::Impl::create() {
 }
 
 Status Gather::Impl::create_pipelines() {
-  const std::vector<const gpu::BindLayout*> layouts{&scene.layout(), &scene.instant_layout(), &lighting.layout(),
-                                                    &groups.layout()};
+  const std::vector<const gpu::BindLayout*> layouts{&scene.layout(), &scene.instant_layout(),
+                                                    &lighting.layout(), &groups.layout()};
   std::vector<gpu::Constant> constants = scene.constants();
   for (const gpu::Constant& c : lighting.constants()) constants.push_back(c);
   // Single colours are computed on every path.
@@ -125,8 +128,8 @@ Status Gather::Impl::upload(const GatherWork& work) {
   return absl::OkStatus();
 }
 
-void Gather::Impl::record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, const vec4& eye,
-                                  const GatherWork& work) {
+void Gather::Impl::record_compute(gpu::Commands& commands, const scene::SceneInstant& instant,
+                                  const vec4& eye, const GatherWork& work) {
   for (const ComputeBatch& batch : work.compute_batches) {
     commands.bind(compute, {&scene.group(), &instant.group(), &lighting.group(), &groups.of(batch.material)});
     commands.push(PassPush{eye, settings.width, settings.height, batch.first_chunk, batch.end_chunk});
@@ -162,7 +165,8 @@ StatusOr<std::unique_ptr<Gather>> Gather::create(gpu::Device& device, const scen
 
 Status Gather::record(gpu::Commands& commands, const scene::SceneInstant& instant, const dvec3& eye,
                       std::span<const atlas::Placement> placements) {
-  const GatherLimits limits{impl_->settings.width, impl_->settings.height, raster_from_texels(impl_->settings.path)};
+  const GatherLimits limits{impl_->settings.width, impl_->settings.height,
+                            raster_from_texels(impl_->settings.path)};
   TESSERA_ASSIGN_OR_RETURN(const GatherWork work, build_gather_work(impl_->scene, placements, limits));
   TESSERA_RETURN_IF_ERROR(impl_->upload(work));
   const vec4 relative_eye(vec3(eye - instant.origin()), 1);
@@ -174,8 +178,12 @@ Status Gather::record(gpu::Commands& commands, const scene::SceneInstant& instan
   return absl::OkStatus();
 }
 
-std::span<const uint32_t> Gather::colors() const { return impl_->colors.as<const uint32_t>().first(impl_->color_count); }
-const gpu::Image& Gather::image() const { return impl_->image; }
+std::span<const uint32_t> Gather::colors() const {
+  return impl_->colors.as<const uint32_t>().first(impl_->color_count);
+}
+const gpu::Image& Gather::image() const {
+  return impl_->image;
+}
 
 const GatherStats& Gather::stats() const {
   for (const auto& interval : impl_->device.intervals())

@@ -1,5 +1,5 @@
-// Shades the samples of placed patches into the atlas image (the gather). Two paths with the same result: raster
-// rectangles for large blocks, compute for small ones.
+// Shades the samples of placed patches into the atlas image (the gather). Two paths with the same result:
+// raster rectangles for large blocks, compute for small ones.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ namespace tessera::shading {
 enum class GatherPath { automatic, compute, raster };
 
 struct GatherSettings {
-  uint32_t width = 2048, height = 1024;  // of the atlas
+  uint32_t width = 2048, height = 1024;     // of the atlas
   GatherPath path = GatherPath::automatic;  // automatic: raster from 16x16 texels on
 };
 
@@ -26,20 +26,21 @@ struct GatherStats {
   double gpu_ms = 0;
 };
 
-// Per session. The atlas image is sRGB-encoded RGBA8 (alpha 255 in used texels); texels that no block uses keep the
-// colour that they had (a still image costs a video coder nothing), mid-grey at first.
+// Per session. The atlas image is sRGB-encoded RGBA8 (alpha 255 in used texels); texels that no block uses
+// keep the colour that they had (a still image costs a video coder nothing), mid-grey at first.
 class Gather {
  public:
   static StatusOr<std::unique_ptr<Gather>> create(gpu::Device& device, const scene::GpuScene& scene,
                                                   const Lighting& lighting, const GatherSettings& settings);
   ~Gather();
 
-  // Shades all `placements` as seen from `eye` (world). Records into `commands`; the same Gather must not be recorded
-  // again before that work is done. Masked patches also get their coverage half.
+  // Shades all `placements` as seen from `eye` (world). Records into `commands`, as the interval "gather" (so
+  // not within another interval) and with a barrier at its end; the same Gather must not be recorded again
+  // before that work is done. Masked patches also get their coverage half.
   Status record(gpu::Commands& commands, const scene::SceneInstant& instant, const dvec3& eye,
                 std::span<const atlas::Placement> placements);
-  // After that work is done: sRGB colours of the placements of kind color, in the order of `placements` of record(),
-  // 0xBBGGRR.
+  // After that work is done: sRGB colours of the placements of kind color, in the order of `placements` of
+  // record(), 0xBBGGRR.
   std::span<const uint32_t> colors() const;
   const gpu::Image& image() const;
   const GatherStats& stats() const;

@@ -27,10 +27,11 @@ Status check(const atlas::Placement& p, uint32_t patch_count, const GatherLimits
     return absl::InvalidArgumentError(
         absl::StrFormat("gather: placement of patch %u, the scene has %u", p.patch, patch_count));
   if (p.kind == atlas::PlacementKind::color) return absl::OkStatus();
-  if (p.level.log_w > 15 || p.level.log_h > 15 || p.x + p.width() > limits.width || p.y + p.height() > limits.height)
-    return absl::InvalidArgumentError(absl::StrFormat("gather: block of 2^%u x 2^%u texels at (%u, %u) leaves the %ux%u atlas",
-                                                      p.level.log_w, p.level.log_h, p.x, p.y, limits.width,
-                                                      limits.height));
+  if (p.level.log_w > 15 || p.level.log_h > 15 || p.x + p.width() > limits.width ||
+      p.y + p.height() > limits.height)
+    return absl::InvalidArgumentError(
+        absl::StrFormat("gather: block of 2^%u x 2^%u texels at (%u, %u) leaves the %ux%u atlas",
+                        p.level.log_w, p.level.log_h, p.x, p.y, limits.width, limits.height));
   return absl::OkStatus();
 }
 
@@ -63,7 +64,9 @@ std::vector<uint32_t> order_by_material(std::span<const Item> items, size_t mate
   return order;
 }
 
-uint64_t item_samples(const BlockRecord& r) { return uint64_t{1} << ((r.shape & 15) + ((r.shape >> 4) & 15)); }
+uint64_t item_samples(const BlockRecord& r) {
+  return uint64_t{1} << ((r.shape & 15) + ((r.shape >> 4) & 15));
+}
 
 // Appends compute blocks and the start of every chunk; each material's samples fill whole chunks.
 void add_compute(GatherWork& work, std::span<const Item> items, std::span<const uint32_t> order) {
@@ -96,7 +99,8 @@ void add_raster(GatherWork& work, std::span<const Item> items, std::span<const u
   uint32_t material = ~0u;
   for (uint32_t i : order) {
     if (!items[i].raster) continue;
-    if (items[i].material != material) work.raster_batches.push_back({items[i].material, static_cast<uint32_t>(work.blocks.size()), 0});
+    if (items[i].material != material)
+      work.raster_batches.push_back({items[i].material, static_cast<uint32_t>(work.blocks.size()), 0});
     material = items[i].material;
     ++work.raster_batches.back().block_count;
     ++work.raster_blocks;
@@ -107,7 +111,8 @@ void add_raster(GatherWork& work, std::span<const Item> items, std::span<const u
 
 }  // namespace
 
-StatusOr<GatherWork> build_gather_work(const scene::GpuScene& gpu_scene, std::span<const atlas::Placement> placements,
+StatusOr<GatherWork> build_gather_work(const scene::GpuScene& gpu_scene,
+                                       std::span<const atlas::Placement> placements,
                                        const GatherLimits& limits) {
   const scene::Scene& scene = gpu_scene.scene();
   GatherWork work;
@@ -120,12 +125,13 @@ StatusOr<GatherWork> build_gather_work(const scene::GpuScene& gpu_scene, std::sp
     const scene::Instance& owner = scene.instances[instance];
     const scene::Patch& patch = finder.geometry(instance).patches[p.patch - owner.first_patch];
     const bool color = p.kind == atlas::PlacementKind::color;
-    items.push_back({.record = {.instance = instance,
-                                .first_triangle = gpu_scene.first_index(owner.geometry) / 3 + patch.first_triangle,
-                                .place = color ? work.colors++ : p.x | uint32_t{p.y} << 16,
-                                .shape = shape_of(p, patch.triangle_count)},
-                     .material = owner.material,
-                     .raster = !color && texels(p) >= limits.raster_from_texels});
+    items.push_back(
+        {.record = {.instance = instance,
+                    .first_triangle = gpu_scene.first_index(owner.geometry) / 3 + patch.first_triangle,
+                    .place = color ? work.colors++ : p.x | uint32_t{p.y} << 16,
+                    .shape = shape_of(p, patch.triangle_count)},
+         .material = owner.material,
+         .raster = !color && texels(p) >= limits.raster_from_texels});
   }
   const std::vector<uint32_t> order = order_by_material(items, scene.materials.size());
   add_compute(work, items, order);

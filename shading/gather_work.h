@@ -43,12 +43,13 @@ struct GatherWork {
 };
 
 struct GatherLimits {
-  uint32_t width, height;        // of the atlas
-  uint64_t raster_from_texels;   // blocks of at least so many texels go to the raster path
+  uint32_t width, height;       // of the atlas
+  uint64_t raster_from_texels;  // blocks of at least so many texels go to the raster path
 };
 
 // InvalidArgument if a placement names no patch of the scene or leaves the atlas.
-StatusOr<GatherWork> build_gather_work(const scene::GpuScene& scene, std::span<const atlas::Placement> placements,
+StatusOr<GatherWork> build_gather_work(const scene::GpuScene& scene,
+                                       std::span<const atlas::Placement> placements,
                                        const GatherLimits& limits);
 
 }  // namespace tessera::shading

@@ -10,8 +10,8 @@
 
 namespace tessera::shading {
 
-// Makes `buffer` hold at least `bytes` (never 0: a binding needs something). True if it is a new one, to be bound again.
-// The old one must not be in use.
+// Makes `buffer` hold at least `bytes` (never 0: a binding needs something). True if it is a new one, to be
+// bound again. The old one must not be in use.
 inline StatusOr<bool> grow(gpu::Device& device, gpu::Buffer& buffer, uint64_t bytes, gpu::Memory memory,
                            std::string_view name) {
   if (buffer.size() >= std::max<uint64_t>(bytes, 1)) return false;

@@ -6,7 +6,7 @@
 namespace tessera::shading {
 namespace {
 
-constexpr double kCellM = 1.5;          // wished side of a cell
+constexpr double kCellM = 1.5;                   // wished side of a cell
 constexpr uint32_t kMaxCells[3] = {32, 16, 32};  // flatter than wide, as scenes are
 
 struct Sphere {
@@ -35,7 +35,8 @@ LightGrid build_light_grid(std::span<const PlacedLight> lights) {
     grid.min = min;
     for (int a = 0; a < 3; ++a) {
       const double extent = max[a] - min[a];
-      grid.size[a] = std::clamp(static_cast<uint32_t>(std::min(std::ceil(extent / kCellM), 1e3)), 1u, kMaxCells[a]);
+      grid.size[a] =
+          std::clamp(static_cast<uint32_t>(std::min(std::ceil(extent / kCellM), 1e3)), 1u, kMaxCells[a]);
       cell[a] = std::max(extent / grid.size[a], 1e-6);
     }
   }

@@ -1,4 +1,5 @@
-// A uniform grid over the reach of the local lights: a sample evaluates only the lights that may reach its cell.
+// A uniform grid over the reach of the local lights: a sample evaluates only the lights that may reach its
+// cell.
 #pragma once
 
 #include <span>
@@ -9,7 +10,7 @@
 namespace tessera::shading {
 
 struct LightGrid {
-  dvec3 min{0};                 // world
+  dvec3 min{0};  // world
   vec3 cells_per_m{1};
   uint32_t size[3] = {1, 1, 1};
   // size[0] * size[1] * size[2] cells, x fastest, and one more for everything outside.

@@ -37,7 +37,8 @@ LightPlan plan_lights(const scene::Scene& scene, bool sun_shadow, uint32_t max_s
   others.insert(others.end(), points.begin(), points.end());
   std::stable_sort(others.begin(), others.end(), stronger);
   others.resize(std::min<size_t>(others.size(), kMaxGridLights));
-  for (const auto* part : {&suns, &spots, &others}) plan.order.insert(plan.order.end(), part->begin(), part->end());
+  for (const auto* part : {&suns, &spots, &others})
+    plan.order.insert(plan.order.end(), part->begin(), part->end());
   return plan;
 }
 

@@ -14,8 +14,8 @@ constexpr uint32_t kMaxSpotShadows = kMaxLeadingLights - kMaxDirectional;
 
 // Roles are fixed when a scene is loaded; only places change with time.
 struct LightPlan {
-  // Indices into Scene::lights: directional ones, the strongest first; shadowed spots, likewise; all others. Lights
-  // that no node carries are left out, and the weakest where there are more than kMaxDirectional
+  // Indices into Scene::lights: directional ones, the strongest first; shadowed spots, likewise; all others.
+  // Lights that no node carries are left out, and the weakest where there are more than kMaxDirectional
   // directional or kMaxGridLights other lights.
   std::vector<uint32_t> order;
   uint32_t directional = 0, sun_shadows = 0, spot_shadows = 0;

@@ -13,12 +13,10 @@ namespace {
 
 enum LightingBinding : uint32_t { kLeading, kGridLights, kSunMap, kSpotMaps, kCells, kCellLights };
 
-constexpr gpu::Binding kBindings[] = {{kLeading, gpu::BindingKind::uniform_buffer},
-                                      {kGridLights, gpu::BindingKind::uniform_buffer},
-                                      {kSunMap, gpu::BindingKind::sampled_image},
-                                      {kSpotMaps, gpu::BindingKind::sampled_image},
-                                      {kCells, gpu::BindingKind::storage_buffer},
-                                      {kCellLights, gpu::BindingKind::storage_buffer}};
+constexpr gpu::Binding kBindings[] = {
+    {kLeading, gpu::BindingKind::uniform_buffer}, {kGridLights, gpu::BindingKind::uniform_buffer},
+    {kSunMap, gpu::BindingKind::sampled_image},   {kSpotMaps, gpu::BindingKind::sampled_image},
+    {kCells, gpu::BindingKind::storage_buffer},   {kCellLights, gpu::BindingKind::storage_buffer}};
 
 }  // namespace
 
@@ -123,11 +121,17 @@ Status Lighting::update(const scene::SceneInstant& instant) {
   return absl::OkStatus();
 }
 
-const gpu::BindLayout& Lighting::layout() const { return impl_->layout; }
-const gpu::BindGroup& Lighting::group() const { return impl_->group; }
+const gpu::BindLayout& Lighting::layout() const {
+  return impl_->layout;
+}
+const gpu::BindGroup& Lighting::group() const {
+  return impl_->group;
+}
 std::vector<gpu::Constant> Lighting::constants() const {
   return feature_constants(impl_->scene.scene().features, impl_->plan);
 }
-uint32_t Lighting::shadow_maps() const { return impl_->maps->count(); }
+uint32_t Lighting::shadow_maps() const {
+  return impl_->maps->count();
+}
 
 }  // namespace tessera::shading

@@ -12,7 +12,8 @@ namespace {
 constexpr uint32_t kCopyBinding = 1;  // set 1 of material_copy.comp
 
 // The scene's material records, as the device has them.
-StatusOr<std::vector<scene::MaterialRecord>> read_materials(gpu::Device& device, const scene::GpuScene& scene) {
+StatusOr<std::vector<scene::MaterialRecord>> read_materials(gpu::Device& device,
+                                                            const scene::GpuScene& scene) {
   const auto count = static_cast<uint32_t>(scene.scene().materials.size());
   std::vector<scene::MaterialRecord> records(count);
   if (count == 0) return records;

@@ -1,6 +1,7 @@
-// Descriptor set 3 of the shading passes, one group a material: binding 0 is the material's record as a uniform buffer,
-// the others are the pass's own. All samples of a draw or dispatch have one material; on the software device a load from
-// a uniform buffer costs a tenth of one from the scene's storage buffer (measured: a third of a frame's time).
+// Descriptor set 3 of the shading passes, one group a material: binding 0 is the material's record as a
+// uniform buffer, the others are the pass's own. All samples of a draw or dispatch have one material; on the
+// software device a load from a uniform buffer costs a tenth of one from the scene's storage buffer
+// (measured: a third of a frame's time).
 #pragma once
 
 #include <span>

@@ -14,14 +14,16 @@
 namespace tessera::shading {
 namespace {
 
-constexpr gpu::Format kColor = gpu::Format::rgba8_unorm;  // sRGB-encoded by the shader, so that resolving averages that
+constexpr gpu::Format kColor =
+    gpu::Format::rgba8_unorm;  // sRGB-encoded by the shader, so that resolving averages that
 constexpr gpu::Format kIds = gpu::Format::rg32_uint;
 constexpr gpu::Format kDepth = gpu::Format::depth32_float;
 constexpr uint32_t kMaxSide = 16384;
 constexpr uint32_t kViewBinding = 1;
 
-// Standard sample positions in a pixel (Vulkan specification, "Multisampling"). Each is a pass of its own: on the software
-// device sample shading would run the fragment shader for occluded samples too (measured: 3 to 4 times the time).
+// Standard sample positions in a pixel (Vulkan specification, "Multisampling"). Each is a pass of its own: on
+// the software device sample shading would run the fragment shader for occluded samples too (measured: 3 to 4
+// times the time).
 constexpr vec2 kCentre{0.5f, 0.5f};
 constexpr vec2 kFourSamples[] = {{0.375f, 0.125f}, {0.875f, 0.375f}, {0.125f, 0.625f}, {0.625f, 0.875f}};
 
@@ -108,13 +110,13 @@ struct ReferenceRenderer::Impl {
 Status ReferenceRenderer::Impl::create() {
   const gpu::Binding binding{kViewBinding, gpu::BindingKind::uniform_buffer};
   TESSERA_ASSIGN_OR_RETURN(groups, MaterialGroups::create(device, scene, {&binding, 1}));
-  TESSERA_ASSIGN_OR_RETURN(view_buffer,
-                           gpu::Buffer::create(device, sizeof(ViewRecord), gpu::Memory::upload, "reference view"));
+  TESSERA_ASSIGN_OR_RETURN(
+      view_buffer, gpu::Buffer::create(device, sizeof(ViewRecord), gpu::Memory::upload, "reference view"));
   groups.set(kViewBinding, view_buffer);
   TESSERA_ASSIGN_OR_RETURN(depth_pass, create_pipelines({.name = "reference depth"}, {}, forward_mask_frag));
-  TESSERA_ASSIGN_OR_RETURN(color_pass,
-                           create_pipelines({.name = "reference color", .colors = {kColor}, .depth_write = false},
-                                            forward_frag, forward_frag));
+  TESSERA_ASSIGN_OR_RETURN(
+      color_pass, create_pipelines({.name = "reference color", .colors = {kColor}, .depth_write = false},
+                                   forward_frag, forward_frag));
   return absl::OkStatus();
 }
 
@@ -139,7 +141,8 @@ StatusOr<Pipelines> ReferenceRenderer::Impl::create_pipelines(gpu::RasterPipelin
 
 Status ReferenceRenderer::Impl::ensure_id_pass() {
   if (id_pass_ready) return absl::OkStatus();
-  TESSERA_ASSIGN_OR_RETURN(id_pass, create_pipelines({.name = "reference ids", .colors = {kIds}}, ids_frag, ids_frag));
+  TESSERA_ASSIGN_OR_RETURN(id_pass,
+                           create_pipelines({.name = "reference ids", .colors = {kIds}}, ids_frag, ids_frag));
   id_pass_ready = true;
   return absl::OkStatus();
 }
@@ -168,8 +171,8 @@ Status ReferenceRenderer::Impl::ensure_id_targets(const View& view) {
   desc.format = kDepth;
   TESSERA_ASSIGN_OR_RETURN(t.depth, gpu::Image::create(device, desc, "reference id depth"));
   const uint64_t bytes = uint64_t{8} * view.width * view.height;
-  TESSERA_ASSIGN_OR_RETURN(t.readback,
-                           gpu::Buffer::create(device, bytes, gpu::Memory::readback, "reference id readback"));
+  TESSERA_ASSIGN_OR_RETURN(
+      t.readback, gpu::Buffer::create(device, bytes, gpu::Memory::readback, "reference id readback"));
   t.width = view.width, t.height = view.height;
   return absl::OkStatus();
 }
@@ -205,11 +208,8 @@ void ReferenceRenderer::Impl::record_sample(gpu::Commands& commands, const scene
   commands.barrier();
   gpu::ColorAttachment color{.image = &t.color};
   color.clear = {kBackground[0] / 255.0f, kBackground[1] / 255.0f, kBackground[2] / 255.0f, 0.0f};
-  commands.begin_rendering({.colors = {&color, 1},
-                            .depth = &t.depth,
-                            .clear_depth = false,
-                            .width = t.width,
-                            .height = t.height});
+  commands.begin_rendering(
+      {.colors = {&color, 1}, .depth = &t.depth, .clear_depth = false, .width = t.width, .height = t.height});
   draw(commands, instant, color_pass, list, sample_at);
   commands.end_rendering();
   commands.barrier();
@@ -220,7 +220,8 @@ void ReferenceRenderer::Impl::record_sample(gpu::Commands& commands, const scene
 void ReferenceRenderer::Impl::record_color(gpu::Commands& commands, const scene::SceneInstant& instant,
                                            const DrawList& list) {
   commands.begin_interval("reference color");
-  for (uint32_t sample = 0; sample < targets.samples; ++sample) record_sample(commands, instant, list, sample);
+  for (uint32_t sample = 0; sample < targets.samples; ++sample)
+    record_sample(commands, instant, list, sample);
   commands.end_interval();
 }
 
@@ -237,7 +238,8 @@ void ReferenceRenderer::Impl::record_ids(gpu::Commands& commands, const scene::S
   commands.end_interval();
 }
 
-// The mean of the samples' pictures, rounded as a resolve does. Their alpha tells whether geometry covers them.
+// The mean of the samples' pictures, rounded as a resolve does. Their alpha tells whether geometry covers
+// them.
 void ReferenceRenderer::Impl::read_color(ReferenceImage& image, bool covered) const {
   image.color = Image8(targets.width, targets.height);
   const size_t bytes = image.color.rgba.size();
@@ -277,16 +279,18 @@ StatusOr<std::unique_ptr<ReferenceRenderer>> ReferenceRenderer::create(gpu::Devi
   return std::unique_ptr<ReferenceRenderer>(new ReferenceRenderer(std::move(impl)));
 }
 
-StatusOr<ReferenceImage> ReferenceRenderer::render(const scene::SceneInstant& instant, const View& requested_view,
+StatusOr<ReferenceImage> ReferenceRenderer::render(const scene::SceneInstant& instant,
+                                                   const View& requested_view,
                                                    const ReferenceRequest& request) {
   Impl& r = *impl_;
   View view = requested_view;
   view.pose = normalized(view.pose);
   if (view.width == 0 || view.height == 0 || view.width > kMaxSide || view.height > kMaxSide)
-    return absl::InvalidArgumentError(absl::StrFormat("reference: %ux%u pixels, each side must be 1..%u", view.width,
-                                                      view.height, kMaxSide));
+    return absl::InvalidArgumentError(absl::StrFormat("reference: %ux%u pixels, each side must be 1..%u",
+                                                      view.width, view.height, kMaxSide));
   if (request.samples != 1 && request.samples != 4)
-    return absl::InvalidArgumentError(absl::StrFormat("reference: %u samples, must be 1 or 4", request.samples));
+    return absl::InvalidArgumentError(
+        absl::StrFormat("reference: %u samples, must be 1 or 4", request.samples));
 
   TESSERA_RETURN_IF_ERROR(r.ensure_targets(view, request.samples));
   const bool ids = request.ids || request.depth;
@@ -311,6 +315,8 @@ StatusOr<ReferenceImage> ReferenceRenderer::render(const scene::SceneInstant& in
   return image;
 }
 
-double ReferenceRenderer::gpu_ms() const { return impl_->gpu_ms; }
+double ReferenceRenderer::gpu_ms() const {
+  return impl_->gpu_ms;
+}
 
 }  // namespace tessera::shading

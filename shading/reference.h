@@ -1,6 +1,7 @@
-// The forward reference renderer: the truth in every comparison, and the source of the baselines' pictures. Same
-// materials, lights and shadows as the gather passes; 4 shaded samples a pixel at the standard 4x MSAA positions, averaged in sRGB-encoded
-// values (as the client's framebuffer resolves them). Texture gradients are analytic, for the footprint of a whole pixel.
+// The forward reference renderer: the truth in every comparison, and the source of the baselines' pictures.
+// Same materials, lights and shadows as the gather passes; 4 shaded samples a pixel at the standard 4x MSAA
+// positions, averaged in sRGB-encoded values (as the client's framebuffer resolves them). Texture gradients
+// are analytic, for the footprint of a whole pixel.
 #pragma once
 
 #include <memory>
@@ -14,10 +15,13 @@
 namespace tessera::shading {
 
 struct ReferenceImage {
-  Image8 color;                           // sRGB
-  std::vector<uint32_t> triangle_plus_one;  // centre sample: instanced triangle id + 1, 0 = background; empty unless asked for
-  std::vector<uint8_t> covered;             // 1 where all samples hit geometry; empty unless asked for
-  std::vector<float> depth;                 // centre sample, metres along -Z, infinity = background; empty unless asked for
+  Image8 color;  // sRGB
+  // Of the centre sample: instanced triangle id + 1, 0 = background. Empty unless ids are asked for.
+  std::vector<uint32_t> triangle_plus_one;
+  // 1 where all samples hit geometry. Empty unless ids are asked for.
+  std::vector<uint8_t> covered;
+  // Of the centre sample: metres along -Z, infinity = background. Empty unless asked for.
+  std::vector<float> depth;
 };
 
 struct ReferenceRequest {
@@ -28,12 +32,14 @@ struct ReferenceRequest {
 
 class ReferenceRenderer {
  public:
-  static StatusOr<std::unique_ptr<ReferenceRenderer>> create(gpu::Device& device, const scene::GpuScene& scene,
+  static StatusOr<std::unique_ptr<ReferenceRenderer>> create(gpu::Device& device,
+                                                             const scene::GpuScene& scene,
                                                              const Lighting& lighting);
   ~ReferenceRenderer();
 
   // Blocks. The background is kBackground.
-  StatusOr<ReferenceImage> render(const scene::SceneInstant& instant, const View& view, const ReferenceRequest& request);
+  StatusOr<ReferenceImage> render(const scene::SceneInstant& instant, const View& view,
+                                  const ReferenceRequest& request);
   double gpu_ms() const;  // of the last render
 
  private:

@@ -11,8 +11,8 @@ struct ShadowFit {
   double texel_m = 0;        // side of a texel: metres (sun) or metres per metre of distance (spot)
 };
 
-// Orthographic over the scene's main extent: what holds the central 98 % of the triangles across the light's direction
-// (far mountains stay out), and the depth of all of them.
+// Orthographic over the scene's main extent: what holds the central 98 % of the triangles across the light's
+// direction (far mountains stay out), and the depth of all of them.
 ShadowFit fit_sun(const scene::Scene& scene, const std::vector<dmat4>& transforms, const dvec3& direction,
                   uint32_t side_texels);
 

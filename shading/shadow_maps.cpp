@@ -18,12 +18,14 @@ mat4 relative_to(const dmat4& clip_from_world, const dvec3& origin) {
 }  // namespace
 
 StatusOr<std::unique_ptr<ShadowMaps>> ShadowMaps::create(gpu::Device& device, const scene::GpuScene& scene,
-                                                         const LightPlan& plan, const ShadowMapSettings& settings) {
+                                                         const LightPlan& plan,
+                                                         const ShadowMapSettings& settings) {
   std::unique_ptr<ShadowMaps> maps(new ShadowMaps(device, scene, plan, settings));
   const uint32_t sun_side = plan.sun_shadows ? settings.sun_side : 1;
   const uint32_t spot_side = plan.spot_shadows ? settings.spot_side : 1;
   const uint32_t spot_width = spot_side * std::max(plan.spot_shadows, 1u);
-  TESSERA_ASSIGN_OR_RETURN(maps->sun_map_, gpu::Image::create(device, {sun_side, sun_side, kDepth}, "sun shadow map"));
+  TESSERA_ASSIGN_OR_RETURN(maps->sun_map_,
+                           gpu::Image::create(device, {sun_side, sun_side, kDepth}, "sun shadow map"));
   TESSERA_ASSIGN_OR_RETURN(maps->spot_maps_,
                            gpu::Image::create(device, {spot_width, spot_side, kDepth}, "spot shadow maps"));
   if (plan.sun_shadows) TESSERA_RETURN_IF_ERROR(maps->create_pipelines(maps->sun_pipelines_, true));
@@ -69,13 +71,15 @@ Status ShadowMaps::draw(const scene::SceneInstant& instant, std::span<const Plac
   gpu::Commands commands = device_.begin();
   commands.begin_interval("shadow maps");
   if (plan_.sun_shadows) {
-    fits_.push_back(fit_sun(scene_.scene(), instant.instance_transforms(), lights[0].direction, settings_.sun_side));
+    fits_.push_back(
+        fit_sun(scene_.scene(), instant.instance_transforms(), lights[0].direction, settings_.sun_side));
     commands.begin_rendering({.depth = &sun_map_, .width = sun_map_.width(), .height = sun_map_.height()});
     record_map(commands, instant, fits_.back(), sun_pipelines_, true);
     commands.end_rendering();
   }
   if (plan_.spot_shadows) {
-    commands.begin_rendering({.depth = &spot_maps_, .width = spot_maps_.width(), .height = spot_maps_.height()});
+    commands.begin_rendering(
+        {.depth = &spot_maps_, .width = spot_maps_.width(), .height = spot_maps_.height()});
     for (uint32_t i = 0; i < plan_.spot_shadows; ++i) {
       fits_.push_back(fit_spot(lights[plan_.directional + i], settings_.spot_side));
       commands.set_viewport(i * settings_.spot_side, 0, settings_.spot_side, settings_.spot_side);

@@ -20,7 +20,8 @@ struct ShadowMapSettings {
 class ShadowMaps {
  public:
   static StatusOr<std::unique_ptr<ShadowMaps>> create(gpu::Device& device, const scene::GpuScene& scene,
-                                                      const LightPlan& plan, const ShadowMapSettings& settings);
+                                                      const LightPlan& plan,
+                                                      const ShadowMapSettings& settings);
 
   // Fits and draws all maps for the instant. Blocks.
   Status draw(const scene::SceneInstant& instant, std::span<const PlacedLight> lights);

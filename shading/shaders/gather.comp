@@ -9,20 +9,18 @@ layout(set = 3, binding = 2, std430) readonly buffer Starts { uint starts[]; }; 
 layout(set = 3, binding = 3, std430) writeonly buffer Colors { uint colors[]; };
 layout(set = 3, binding = 4, rgba8) uniform writeonly image2D atlas;
 
-// No return before the textures: see sample_surface().
 void main() {
-  uint index = pass.first_chunk + gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-  uint chunk = min(index, pass.end_chunk - 1u);
+  uint chunk = pass.first_chunk + gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+  if (chunk >= pass.end_chunk) return;
   uint s = chunk * 64u + gl_LocalInvocationID.x;
   uint b = starts[chunk];
   while (s >= blocks[b + 1u].first_sample) ++b;  // the last block is followed by one that never starts
   Block block = blocks[b];
   uint i = s - block.first_sample;
   uvec2 size = block_size(block.shape);
-  uvec2 texel = uvec2(i & (size.x - 1u), (i >> (block.shape & 15u)) & (size.y - 1u));
+  if (i >= size.x * size.y) return;  // padding between materials
+  uvec2 texel = uvec2(i & (size.x - 1u), i >> (block.shape & 15u));
   vec4 color = vec4(srgb_encode_color(block_texel(block, texel)), 1.0);
-  // Beyond the dispatch's last chunk, or padding between materials.
-  if (index >= pass.end_chunk || i >= size.x * size.y) return;
   if ((block.shape & kBlockColor) != 0u)
     colors[block.place] = packUnorm4x8(vec4(color.rgb, 0.0));
   else

@@ -15,10 +15,12 @@ vec3 direction(float cosine, float azimuth) {
   return vec3(sine * std::cos(azimuth), sine * std::sin(azimuth), cosine);
 }
 
-bool is_finite(const vec3& c) { return std::isfinite(c.x) && std::isfinite(c.y) && std::isfinite(c.z); }
+bool is_finite(const vec3& c) {
+  return std::isfinite(c.x) && std::isfinite(c.y) && std::isfinite(c.z);
+}
 
-// Share of uniform white light from the upper hemisphere that comes out towards `v`. The lobe is integrated around
-// half vectors (density of GGX itself), so that a narrow one is met.
+// Share of uniform white light from the upper hemisphere that comes out towards `v`. The lobe is integrated
+// around half vectors (density of GGX itself), so that a narrow one is met.
 double albedo(const Substance& s, const vec3& v) {
   constexpr int kSteps = 160;
   const double alpha2 = std::pow(double{s.roughness}, 4.0);
@@ -29,7 +31,8 @@ double albedo(const Substance& s, const vec3& v) {
       const float cosine = static_cast<float>(std::sqrt((1 - x) / (1 + (alpha2 - 1) * x)));
       const vec3 h = direction(cosine, 6.2831853f * (static_cast<float>(j) + 0.5f) / kSteps);
       const vec3 l = 2 * dot(v, h) * h - v;
-      const double density = ggx_distribution(cosine, s.roughness * s.roughness) * cosine / (4 * std::max(dot(v, h), 1e-6f));
+      const double density =
+          ggx_distribution(cosine, s.roughness * s.roughness) * cosine / (4 * std::max(dot(v, h), 1e-6f));
       if (l.z > 0 && density > 0) sum += reflected(s, kUp, v, l).x / density;
     }
   return sum / (kSteps * kSteps);
@@ -73,7 +76,8 @@ TEST(Brdf, LightFromBehindGivesNothing) {
 }
 
 TEST(Brdf, IsFiniteAtEveryLimit) {
-  const vec3 directions[] = {kUp, -kUp, vec3(1, 0, 0), vec3(-1, 0, 0), direction(1e-6f, 0), direction(1e-3f, 3), vec3(0)};
+  const vec3 directions[] = {
+      kUp, -kUp, vec3(1, 0, 0), vec3(-1, 0, 0), direction(1e-6f, 0), direction(1e-3f, 3), vec3(0)};
   for (float roughness : {-1.0f, 0.0f, 1e-6f, 1.0f, 2.0f})
     for (float metallic : {-1.0f, 0.0f, 1.0f, 3.0f})
       for (const vec3& n : directions)

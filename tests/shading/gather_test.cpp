@@ -11,16 +11,25 @@ namespace {
 using atlas::Placement;
 using atlas::PlacementKind;
 
-Placement block(scene::PatchId patch, uint32_t x, uint32_t y, uint8_t log_w, uint8_t log_h, bool transposed = false,
-                bool masked = false) {
-  return {patch, PlacementKind::block, {log_w, log_h}, static_cast<uint16_t>(x), static_cast<uint16_t>(y), transposed,
+Placement block(scene::PatchId patch, uint32_t x, uint32_t y, uint8_t log_w, uint8_t log_h,
+                bool transposed = false, bool masked = false) {
+  return {patch,
+          PlacementKind::block,
+          {log_w, log_h},
+          static_cast<uint16_t>(x),
+          static_cast<uint16_t>(y),
+          transposed,
           masked};
 }
 
-float linear(uint8_t byte) { return srgb_decode(static_cast<float>(byte) / 255); }
+float linear(uint8_t byte) {
+  return srgb_decode(static_cast<float>(byte) / 255);
+}
 
 // Vertex colours carry the block coordinates; unlit shows them as they are.
-scene::Material coordinates() { return {.unlit = true}; }
+scene::Material coordinates() {
+  return {.unlit = true};
+}
 
 scene::Material wavy(SceneBuilder& b, bool half_cut) {
   scene::Material m{.metallic = 0.3f, .roughness = 0.4f, .double_sided = true};
@@ -39,16 +48,19 @@ TEST_P(BothPaths, CornersLieAtTexelCentres) {
     SceneBuilder b;
     b.instance(b.patch(triangles), b.material(coordinates()));
     const World world = make_world(b.build());
-    const std::vector<Placement> placements{block(0, 0, 0, 4, 4), block(0, 16, 0, 5, 3), block(0, 48, 0, 3, 2),
-                                            block(0, 64, 0, 1, 1), block(0, 0, 32, 4, 3, true)};
+    const std::vector<Placement> placements{block(0, 0, 0, 4, 4), block(0, 16, 0, 5, 3),
+                                            block(0, 48, 0, 3, 2), block(0, 64, 0, 1, 1),
+                                            block(0, 0, 32, 4, 3, true)};
     const GatherResult r = gather(world, {0.5, 0.5, 2}, placements, settings());
     for (const Placement& p : placements)
       for (uint32_t t = 0; t < triangles; ++t)
         for (uint32_t c = 0; c < 3; ++c) {
           const vec2 corner = scene::patch_corner(triangles, t, c);
           const vec2 along = p.transposed ? vec2(corner.y, corner.x) : corner;
-          const uint32_t x = p.x + static_cast<uint32_t>(std::lround(along.x * static_cast<float>(p.width() - 1)));
-          const uint32_t y = p.y + static_cast<uint32_t>(std::lround(along.y * static_cast<float>(p.height() - 1)));
+          const uint32_t x =
+              p.x + static_cast<uint32_t>(std::lround(along.x * static_cast<float>(p.width() - 1)));
+          const uint32_t y =
+              p.y + static_cast<uint32_t>(std::lround(along.y * static_cast<float>(p.height() - 1)));
           if (triangles == 3 && p.width() == 2) continue;  // the tip shares a corner's texel
           EXPECT_NEAR(linear(r.atlas.at(x, y)[0]), corner.x, 0.01f) << triangles << " at " << x << "," << y;
           EXPECT_NEAR(linear(r.atlas.at(x, y)[1]), corner.y, 0.01f) << triangles << " at " << x << "," << y;
@@ -90,7 +102,8 @@ TEST_P(BothPaths, MaskedBlocksCarryCoverageInTheirSecondHalf) {
   SceneBuilder b;
   b.instance(b.patch(2), b.material(wavy(b, true)));
   const World world = make_world(b.build());
-  const std::vector<Placement> placements{block(0, 0, 0, 5, 4, false, true), block(0, 32, 0, 4, 4, false, true)};
+  const std::vector<Placement> placements{block(0, 0, 0, 5, 4, false, true),
+                                          block(0, 32, 0, 4, 4, false, true)};
   const GatherResult r = gather(world, {0.5, 0.5, 2}, placements, settings());
   for (uint32_t j = 0; j < 16; ++j)
     for (uint32_t i = 0; i < 16; ++i) {
@@ -136,7 +149,11 @@ INSTANTIATE_TEST_SUITE_P(Gather, BothPaths, testing::Values(GatherPath::compute,
 // Three materials, all patch kinds, lights, shadows.
 std::shared_ptr<scene::Scene> mixed_scene() {
   SceneBuilder b;
-  const uint32_t masked = b.material(wavy(b, true)), solid = b.material(wavy(b, false));
+  // Textures of several sizes and encodings: several arrays on the device.
+  scene::Material bumpy = wavy(b, false);
+  bumpy.normal_texture.texture = b.texture(bumpy_texture(32));
+  bumpy.metallic_roughness_texture.texture = b.texture(bumpy_texture(16));
+  const uint32_t masked = b.material(wavy(b, true)), solid = b.material(bumpy);
   scene::Material plain{.base_color = vec4(0.4f, 0.7f, 0.2f, 1), .metallic = 0, .roughness = 0.5f};
   const uint32_t green = b.material(plain);
   b.instance(b.rectangle({-2, -0.5f, 2}, {4, 0, 0}, {0, 0, -4}, 4), solid);
@@ -147,7 +164,8 @@ std::shared_ptr<scene::Scene> mixed_scene() {
       b.instance(b.patch(t), m, node);
     }
   b.light({.type = scene::LightType::directional, .intensity = 3}, {}, {0.3, -1, -0.5});
-  b.light({.type = scene::LightType::point, .color = vec3(1, 0.5f, 0.2f), .intensity = 4, .range = 5}, {0, 1, 2}, {0, 0, -1});
+  b.light({.type = scene::LightType::point, .color = vec3(1, 0.5f, 0.2f), .intensity = 4, .range = 5},
+          {0, 1, 2}, {0, 0, -1});
   return b.build();
 }
 
@@ -155,8 +173,8 @@ std::vector<Placement> mixed_placements(const scene::Scene& scene) {
   std::vector<Placement> placements;
   uint32_t x = 0, y = 0;
   for (scene::PatchId p = 0; p < scene.patch_count; ++p) {
-    const bool masked = scene.materials[scene.instances[scene.instance_of(p)].material].alpha_mode ==
-                        scene::AlphaMode::mask;
+    const bool masked =
+        scene.materials[scene.instances[scene.instance_of(p)].material].alpha_mode == scene::AlphaMode::mask;
     if (p % 5 == 4) {
       placements.push_back({.patch = p, .kind = PlacementKind::color, .masked = masked});
       continue;
@@ -207,7 +225,8 @@ TEST(Gather, MatchesTheReferencePicture) {
   const dvec3 eye(0, 0, 2);
   const Placement p = block(0, 0, 0, 6, 6);
   const GatherResult r = gather(world, eye, {&p, 1}, {.width = 64, .height = 64});
-  // A view in which texel centres are pixel centres: 64 texels span 63/64 of the picture's 2 m at 2 m distance.
+  // A view in which texel centres are pixel centres: 64 texels span 63/64 of the picture's 2 m at 2 m
+  // distance.
   const float t = 0.5f * 64 / 63;
   View view = look(eye, {}, 64);
   view.fov = {-t, t, -t, t};
@@ -238,7 +257,8 @@ TEST(Gather, AnEmptyLayoutDispatchesNothing) {
   SceneBuilder b;
   b.instance(b.patch(2), b.material({}));
   const World world = make_world(b.build());
-  const auto gather = Gather::create(device(), *world.gpu_scene, *world.lighting, {.width = 16, .height = 16});
+  const auto gather =
+      Gather::create(device(), *world.gpu_scene, *world.lighting, {.width = 16, .height = 16});
   ASSERT_TRUE(gather.ok());
   const uint64_t draws = device().draws_recorded(), dispatches = device().dispatches_recorded();
   gpu::Commands commands = device().begin();
@@ -253,12 +273,14 @@ TEST(Gather, RefusesPlacementsThatLeaveTheAtlasOrTheScene) {
   SceneBuilder b;
   b.instance(b.patch(2), b.material({}));
   const World world = make_world(b.build());
-  const auto gather = Gather::create(device(), *world.gpu_scene, *world.lighting, {.width = 16, .height = 16});
+  const auto gather =
+      Gather::create(device(), *world.gpu_scene, *world.lighting, {.width = 16, .height = 16});
   ASSERT_TRUE(gather.ok());
-  for (const Placement& p : {block(1, 0, 0, 2, 2), block(0, 14, 0, 2, 2), block(0, 0, 14, 2, 2), block(0, 0, 0, 40, 2),
-                             Placement{.patch = scene::kNone}}) {
+  for (const Placement& p : {block(1, 0, 0, 2, 2), block(0, 14, 0, 2, 2), block(0, 0, 14, 2, 2),
+                             block(0, 0, 0, 40, 2), Placement{.patch = scene::kNone}}) {
     gpu::Commands commands = device().begin();
-    EXPECT_EQ((*gather)->record(commands, *world.instant, {}, {&p, 1}).code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_EQ((*gather)->record(commands, *world.instant, {}, {&p, 1}).code(),
+              absl::StatusCode::kInvalidArgument);
   }
 }
 

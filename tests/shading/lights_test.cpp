@@ -3,11 +3,11 @@
 
 #include <random>
 
+#include "base/view.h"
 #include "scene_builder.h"
 #include "shading/draw_list.h"
 #include "shading/light_grid.h"
 #include "shading/light_list.h"
-#include "base/view.h"
 #include "shading/shadow_fit.h"
 
 namespace tessera::shading::test {
@@ -53,7 +53,8 @@ TEST(LightGrid, EveryPointFindsTheLightsThatReachIt) {
   for (int i = 0; i < 20000; ++i) {
     const dvec3 p(1.5 * uniform(random), 1.5 * uniform(random), 1.5 * uniform(random));
     const dvec3 c = (p - grid.min) * dvec3(grid.cells_per_m);
-    const bool inside = c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < grid.size[0] && c.y < grid.size[1] && c.z < grid.size[2];
+    const bool inside =
+        c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < grid.size[0] && c.y < grid.size[1] && c.z < grid.size[2];
     const glm::uvec3 u(c);
     const LightCell& cell =
         grid.cells[inside ? (u.z * grid.size[1] + u.y) * grid.size[0] + u.x : grid.outside_cell()];

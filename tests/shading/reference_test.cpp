@@ -16,12 +16,17 @@ Rgb pixel(const ReferenceImage& image, uint32_t x, uint32_t y) {
   const uint8_t* p = image.color.at(x, y);
   return {p[0], p[1], p[2]};
 }
-Rgb center(const ReferenceImage& image) { return pixel(image, image.color.width / 2, image.color.height / 2); }
-int sum(const Rgb& c) { return c[0] + c[1] + c[2]; }
+Rgb center(const ReferenceImage& image) {
+  return pixel(image, image.color.width / 2, image.color.height / 2);
+}
+int sum(const Rgb& c) {
+  return c[0] + c[1] + c[2];
+}
 
 Rgb encoded(const vec3& linear) {
   const vec3 c = 255.0f * srgb_encode_color(linear);
-  return {static_cast<int>(std::lround(c.x)), static_cast<int>(std::lround(c.y)), static_cast<int>(std::lround(c.z))};
+  return {static_cast<int>(std::lround(c.x)), static_cast<int>(std::lround(c.y)),
+          static_cast<int>(std::lround(c.z))};
 }
 
 void expect_near(const Rgb& a, const Rgb& b, int tolerance) {
@@ -35,9 +40,13 @@ scene::Material matte(vec4 color = vec4(1), bool double_sided = false) {
 }
 
 // A 2 m square around the origin that faces +z.
-uint32_t facing_square(SceneBuilder& b, uint32_t cells = 1) { return b.rectangle({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, cells); }
+uint32_t facing_square(SceneBuilder& b, uint32_t cells = 1) {
+  return b.rectangle({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, cells);
+}
 
-scene::Light sun(float intensity) { return {.type = LightType::directional, .intensity = intensity}; }
+scene::Light sun(float intensity) {
+  return {.type = LightType::directional, .intensity = intensity};
+}
 
 const dvec3 kEye(0, 0, 3);
 
@@ -76,9 +85,10 @@ TEST(Reference, PointLightFollowsItsFalloff) {
     b.instance(facing_square(b), b.material(matte()));
     b.light({.type = LightType::point, .intensity = 5, .range = range}, {0, 0, 2}, {0, 0, -1});
     const vec3 n(0, 0, 1);
-    const vec3 light =
-        5 * distance_falloff(4, range > 0 ? 1 / range : 0) * reflected(make_substance(vec3(1), 0, 1), n, n, n);
-    expect_near(center(render(make_world(b.build(), no_ambient()), look(kEye, {}))), encoded(tone_map(light)), 3);
+    const vec3 light = 5 * distance_falloff(4, range > 0 ? 1 / range : 0) *
+                       reflected(make_substance(vec3(1), 0, 1), n, n, n);
+    expect_near(center(render(make_world(b.build(), no_ambient()), look(kEye, {}))), encoded(tone_map(light)),
+                3);
   }
 }
 
@@ -161,11 +171,13 @@ void expect_shadow(const scene::Light& light, const dvec3& position, const dvec3
   EXPECT_GT(sum(center(beside)), 150);
 }
 
-TEST(Shadows, SunIsBlockedByARoof) { expect_shadow(sun(5), {}, {0.05, -1, 0}); }
+TEST(Shadows, SunIsBlockedByARoof) {
+  expect_shadow(sun(5), {}, {0.05, -1, 0});
+}
 
 TEST(Shadows, SpotIsBlockedByARoof) {
-  expect_shadow({.type = LightType::spot, .intensity = 300, .inner_cone_rad = 0.8f, .outer_cone_rad = 0.9f}, {0, 4, 0},
-                {0, -1, 0});
+  expect_shadow({.type = LightType::spot, .intensity = 300, .inner_cone_rad = 0.8f, .outer_cone_rad = 0.9f},
+                {0, 4, 0}, {0, -1, 0});
 }
 
 TEST(Shadows, FlatGroundDoesNotShadowItself) {
@@ -267,8 +279,8 @@ TEST(Reference, RefusesImpossibleRequests) {
             absl::StatusCode::kInvalidArgument);
 }
 
-// Extremes must come out as plain colours: bright where light abounds, dark where it lacks. NaN would be black or
-// arbitrary.
+// Extremes must come out as plain colours: bright where light abounds, dark where it lacks. NaN would be
+// black or arbitrary.
 struct Extreme {
   float roughness, metallic, intensity;
   dvec3 light;
@@ -291,13 +303,12 @@ TEST_P(Stability, GivesABrightPixel) {
   EXPECT_GT(sum(center(image)), 400);
 }
 
-INSTANTIATE_TEST_SUITE_P(Extremes, Stability,
-                         testing::Values(Extreme{0, 0, 50, {0, 0, 2}, false}, Extreme{1, 0, 50, {0, 0, 2}, false},
-                                         Extreme{0, 1, 50, {0, 0, 2}, false}, Extreme{1, 1, 50, {0, 0, 2}, false},
-                                         Extreme{0.5f, 0, 1e6f, {0, 0, 1}, false},
-                                         Extreme{0.5f, 0, 1e6f, {0, 0, 1e-3}, false},
-                                         Extreme{0.5f, 0, 1e30f, {0, 0, 1}, false},
-                                         Extreme{0.5f, 0, 1000, {0, 0, 1}, true}));
+INSTANTIATE_TEST_SUITE_P(
+    Extremes, Stability,
+    testing::Values(Extreme{0, 0, 50, {0, 0, 2}, false}, Extreme{1, 0, 50, {0, 0, 2}, false},
+                    Extreme{0, 1, 50, {0, 0, 2}, false}, Extreme{1, 1, 50, {0, 0, 2}, false},
+                    Extreme{0.5f, 0, 1e6f, {0, 0, 1}, false}, Extreme{0.5f, 0, 1e6f, {0, 0, 1e-3}, false},
+                    Extreme{0.5f, 0, 1e30f, {0, 0, 1}, false}, Extreme{0.5f, 0, 1000, {0, 0, 1}, true}));
 
 }  // namespace
 }  // namespace tessera::shading::test

@@ -51,7 +51,8 @@ uint32_t SceneBuilder::finish(scene::Geometry g) {
     const uint32_t first = g.patches[p].first_triangle;
     const scene::Patch& last = g.patches[p + count - 1];
     const uint32_t end = last.first_triangle + last.triangle_count;
-    g.meshlets.push_back({first, end - first, p, count, g.bounds.center(), 0.5f * glm::length(g.bounds.extent())});
+    g.meshlets.push_back(
+        {first, end - first, p, count, g.bounds.center(), 0.5f * glm::length(g.bounds.extent())});
   }
   scene_->geometries.push_back(std::move(g));
   return static_cast<uint32_t>(scene_->geometries.size() - 1);
@@ -118,6 +119,13 @@ scene::Texture wavy_texture(uint32_t side, bool half_cut) {
       p[2] = static_cast<uint8_t>(128 + 100 * std::sin(turn * (x + y)));
       p[3] = half_cut && x < side / 2 ? 0 : 255;
     }
+  return t;
+}
+
+scene::Texture bumpy_texture(uint32_t side) {
+  scene::Texture t = wavy_texture(side, false);
+  t.srgb = false;
+  for (size_t i = 2; i < t.rgba.size(); i += 4) t.rgba[i] = 255;
   return t;
 }
 

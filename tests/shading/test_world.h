@@ -21,7 +21,8 @@ struct World {
 };
 
 // Small shadow maps; set at time 0 relative to `origin`, lighting updated.
-World make_world(std::shared_ptr<const scene::Scene> scene, LightingSettings settings = {}, const dvec3& origin = {});
+World make_world(std::shared_ptr<const scene::Scene> scene, LightingSettings settings = {},
+                 const dvec3& origin = {});
 
 // No light but the scene's own.
 LightingSettings no_ambient();
