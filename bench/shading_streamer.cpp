@@ -208,7 +208,7 @@ StatusOr<Image8> ShadingStreamer::draw_fresh(const View& view, const scene::Scen
   TESSERA_RETURN_IF_ERROR(impl_->scene->lighting().update(instant));
   gpu::Commands commands = device.begin();
   TESSERA_RETURN_IF_ERROR(
-      impl_->fresh_gather->record(commands, instant, view.pose.position, impl_->current().placements));
+      impl_->fresh_gather->record(commands, instant, view, impl_->current().placements));
   TESSERA_RETURN_IF_ERROR(device.run(std::move(commands)));
   TESSERA_ASSIGN_OR_RETURN(const Image8 atlas, impl_->reader->read(impl_->fresh_gather->image()));
   return impl_->draw(atlas, view);

@@ -14,6 +14,10 @@ using scene::kNone;
 
 namespace {
 
+constexpr uint32_t kRgb = 0xffffffu;
+
+bool is_color(const atlas::Placement& p) { return p.kind == atlas::PlacementKind::color; }
+
 gc::Transform to_wire(const dmat4& matrix) {
   gc::Transform t;
   for (int column = 0; column < 3; ++column) {
@@ -38,9 +42,9 @@ bool differs(uint32_t a, uint32_t b, int threshold) {
 gc::PatchPlacement to_wire(const atlas::Placement& p, uint32_t patch, uint32_t color) {
   gc::PatchPlacement out;
   out.patch = patch;
-  if (p.kind == atlas::PlacementKind::color) {
+  if (is_color(p)) {
     out.kind = gc::PlacementKind::color;
-    out.rgb = color & 0xffffffu;
+    out.rgb = color;
     return out;
   }
   out.kind = gc::PlacementKind::block;
@@ -156,14 +160,15 @@ struct MetaBuilder::Impl {
     return patch_ids[patch] = next_patch++;
   }
 
-  void add_changed(const atlas::LayoutDelta& delta, std::span<const atlas::Placement> placements,
-                   std::span<const uint32_t> colors, std::span<const dmat4> transforms, gc::MetaFrame& out) {
-    size_t at = 0;
+  void add_changed(const atlas::LayoutDelta& delta, const Shown& shown, std::span<const dmat4> transforms,
+                   gc::MetaFrame& out) {
+    size_t at = 0, color = 0;  // in shown.placements, shown.colors
     for (const atlas::Placement& changed : delta.changed) {
-      while (placements[at].patch != changed.patch) ++at;
+      for (; shown.placements[at].patch != changed.patch; ++at) color += is_color(shown.placements[at]);
       const uint32_t id = ensure_patch(changed.patch, transforms, out);
-      out.placements.push_back(to_wire(changed, id, colors[at]));
-      sent_colors[id] = changed.kind == atlas::PlacementKind::color ? (colors[at] & 0xffffffu) : kNone;
+      const uint32_t rgb = is_color(changed) ? shown.colors[color] & kRgb : kNone;
+      out.placements.push_back(to_wire(changed, id, rgb));
+      sent_colors[id] = rgb;
     }
     for (const scene::PatchId removed : delta.removed) {
       const uint32_t id = patch_ids[removed];
@@ -173,13 +178,15 @@ struct MetaBuilder::Impl {
   }
 
   // Colours that moved since they were sent. Runs after add_changed, so that changed patches are already up to date.
-  void add_recolored(std::span<const atlas::Placement> placements, std::span<const uint32_t> colors, gc::MetaFrame& out) {
-    for (size_t i = 0; i < placements.size(); ++i) {
-      if (placements[i].kind != atlas::PlacementKind::color) continue;
-      const uint32_t id = patch_ids[placements[i].patch];
-      if (!differs(sent_colors[id], colors[i], settings.color_threshold)) continue;
-      sent_colors[id] = colors[i] & 0xffffffu;
-      out.placements.push_back(to_wire(placements[i], id, colors[i]));
+  void add_recolored(const Shown& shown, gc::MetaFrame& out) {
+    size_t color = 0;
+    for (const atlas::Placement& placement : shown.placements) {
+      if (!is_color(placement)) continue;
+      const uint32_t rgb = shown.colors[color++] & kRgb;
+      const uint32_t id = patch_ids[placement.patch];
+      if (!differs(sent_colors[id], rgb, settings.color_threshold)) continue;
+      sent_colors[id] = rgb;
+      out.placements.push_back(to_wire(placement, id, rgb));
     }
   }
 
@@ -199,8 +206,7 @@ MetaBuilder::MetaBuilder(const scene::Scene& scene, const MetaSettings& settings
     : impl_(std::make_unique<Impl>(scene, settings)) {}
 MetaBuilder::~MetaBuilder() = default;
 
-gc::MetaFrame MetaBuilder::build(FrameNumber frame, const atlas::LayoutDelta& delta,
-                                 std::span<const atlas::Placement> placements, std::span<const uint32_t> colors,
+gc::MetaFrame MetaBuilder::build(FrameNumber frame, const atlas::LayoutDelta& delta, const Shown& shown,
                                  std::span<const dmat4> transforms) {
   gc::MetaFrame out;
   out.frame = frame;
@@ -209,8 +215,8 @@ gc::MetaFrame MetaBuilder::build(FrameNumber frame, const atlas::LayoutDelta& de
   out.full_state = std::exchange(impl_->first, false);
   if (out.full_state) impl_->measure_scales(transforms);
   impl_->add_moved(transforms, out);
-  impl_->add_changed(delta, placements, colors, transforms, out);
-  impl_->add_recolored(placements, colors, out);
+  impl_->add_changed(delta, shown, transforms, out);
+  impl_->add_recolored(shown, out);
   std::sort(out.placements.begin(), out.placements.end(), [](const auto& a, const auto& b) { return a.patch < b.patch; });
   return out;
 }

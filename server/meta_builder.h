@@ -19,16 +19,20 @@ struct MetaSettings {
   int color_threshold = 4;              // a single colour is sent again when a channel moved by more than this (of 255)
 };
 
+// What the atlas of a frame holds.
+struct Shown {
+  std::span<const atlas::Placement> placements;  // sorted by patch
+  std::span<const uint32_t> colors;  // 0xBBGGRR, one for each placement of kind color, in their order (shading::Gather)
+};
+
 // Per session. Not thread-safe.
 class MetaBuilder {
  public:
   MetaBuilder(const scene::Scene& scene, const MetaSettings& settings);
   ~MetaBuilder();
 
-  // `placements` (sorted by patch) are all current placements with `colors` beside them (0xBBGGRR; read for kind color
-  // only); `transforms` the instances' world matrices. The first frame has full_state.
-  geometry_compression::MetaFrame build(FrameNumber frame, const atlas::LayoutDelta& delta,
-                                        std::span<const atlas::Placement> placements, std::span<const uint32_t> colors,
+  // `transforms`: the instances' world matrices. The first frame has full_state.
+  geometry_compression::MetaFrame build(FrameNumber frame, const atlas::LayoutDelta& delta, const Shown& shown,
                                         std::span<const dmat4> transforms);
 
  private:

@@ -57,7 +57,7 @@ struct Session::Impl {
 
   Status set_up();
   Status find_visible(const FrameInput& input, FrameStats& stats);
-  Status shade(const dvec3& eye, FrameStats& stats);
+  Status shade(const Pose& pose, FrameStats& stats);
   Status encode(const FrameInput& input, const atlas::LayoutDelta& delta, Frame& frame);
 };
 
@@ -102,10 +102,12 @@ Status Session::Impl::find_visible(const FrameInput& input, FrameStats& stats) {
   return absl::OkStatus();
 }
 
-Status Session::Impl::shade(const dvec3& eye, FrameStats& stats) {
+Status Session::Impl::shade(const Pose& pose, FrameStats& stats) {
+  View viewer = settings.client_view;
+  viewer.pose = pose;
   gpu::Device& device = scene->device();
   gpu::Commands commands = device.begin();
-  TESSERA_RETURN_IF_ERROR(gather->record(commands, *instant, eye, layout->placements()));
+  TESSERA_RETURN_IF_ERROR(gather->record(commands, *instant, viewer, layout->placements()));
   commands.barrier();
   TESSERA_RETURN_IF_ERROR(converter->record(commands, gather->image()));
   TESSERA_RETURN_IF_ERROR(device.run(std::move(commands)));
@@ -114,8 +116,8 @@ Status Session::Impl::shade(const dvec3& eye, FrameStats& stats) {
 }
 
 Status Session::Impl::encode(const FrameInput& input, const atlas::LayoutDelta& delta, Frame& frame) {
-  geometry_compression::MetaFrame values = meta->build(frame.number, delta, layout->placements(), gather->colors(),
-                                                       instant->instance_transforms());
+  geometry_compression::MetaFrame values = meta->build(
+      frame.number, delta, {layout->placements(), gather->colors()}, instant->instance_transforms());
   values.rtp_timestamp =
       static_cast<uint32_t>(static_cast<uint64_t>(to_seconds(input.poses.back().time_ns) * kRtpClockHz));
   frame.meta = geometry_compression::encode(values, &frame.stats.meta_bits);
@@ -156,11 +158,20 @@ StatusOr<Frame> Session::render(const FrameInput& input) {
   frame.stats.layout = impl_->layout->stats();
   times.layout_ms = watch.lap_ms();
 
-  TESSERA_RETURN_IF_ERROR(impl_->shade(frame.pose.pose.position, frame.stats));
+  TESSERA_RETURN_IF_ERROR(impl_->shade(frame.pose.pose, frame.stats));
   times.shading_ms = watch.lap_ms();
 
   TESSERA_RETURN_IF_ERROR(impl_->encode(input, delta, frame));
   times.encode_ms = watch.lap_ms();
+  const atlas::blocks::LayoutStats& layout = frame.stats.layout;
+  spdlog::debug(
+      "frame {}: {} views, {} patches seen, {} blocks + {} colours ({} for want of memory), bias {:.2f}, {:.0f} % of the "
+      "atlas used, {} moved, atlas {} B, meta {} B; ms: visibility {:.0f}, layout {:.1f}, shading {:.0f}, encode {:.0f}",
+      frame.number, frame.stats.predicted_views, frame.stats.visible_patches, layout.blocks, layout.colors,
+      layout.colors_out_of_memory, layout.bias,
+      100.0 * static_cast<double>(layout.used_texels) / (impl_->settings.layout.width * impl_->settings.layout.height),
+      layout.changed, frame.atlas.bytes.size(), frame.meta.size(), times.visibility_ms, times.layout_ms, times.shading_ms,
+      times.encode_ms);
   return frame;
 }
 

@@ -22,10 +22,19 @@ enum GatherBinding : uint32_t { kBlocks = 1, kStarts, kColors, kAtlas };
 
 // Pass in shading/shaders/gather.glsl.
 struct PassPush {
-  vec4 eye;
+  vec4 eye, axis, ray_x, ray_y;
   uint32_t width, height;
   uint32_t first_chunk, end_chunk;
 };
+
+PassPush pass_of(const View& viewer, const dvec3& origin) {
+  const glm::dmat3 axes = glm::mat3_cast(viewer.pose.orientation);
+  const Fov& fov = viewer.fov;
+  return {.eye = vec4(vec3(viewer.pose.position - origin), 1),
+          .axis = vec4(vec3(-axes[2]), 0),
+          .ray_x = vec4(vec3(axes[0]) * ((fov.right - fov.left) / static_cast<float>(viewer.width)), 0),
+          .ray_y = vec4(vec3(axes[1]) * ((fov.up - fov.down) / static_cast<float>(viewer.height)), 0)};
+}
 
 uint64_t raster_from_texels(GatherPath path) {
   switch (path) {
@@ -58,9 +67,9 @@ struct Gather::Impl {
   Status create_pipelines();
   Status upload(const GatherWork& work);
   Status fit(uint32_t binding, gpu::Buffer& buffer, uint64_t bytes, gpu::Memory memory);
-  void record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, const vec4& eye,
+  void record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, PassPush push,
                       const GatherWork& work);
-  void record_raster(gpu::Commands& commands, const scene::SceneInstant& instant, const vec4& eye,
+  void record_raster(gpu::Commands& commands, const scene::SceneInstant& instant, PassPush push,
                      const GatherWork& work);
 };
 
@@ -128,25 +137,26 @@ Status Gather::Impl::upload(const GatherWork& work) {
   return absl::OkStatus();
 }
 
-void Gather::Impl::record_compute(gpu::Commands& commands, const scene::SceneInstant& instant,
-                                  const vec4& eye, const GatherWork& work) {
+void Gather::Impl::record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, PassPush push, const GatherWork& work) {
   for (const ComputeBatch& batch : work.compute_batches) {
     commands.bind(compute, {&scene.group(), &instant.group(), &lighting.group(), &groups.of(batch.material)});
-    commands.push(PassPush{eye, settings.width, settings.height, batch.first_chunk, batch.end_chunk});
+    push.first_chunk = batch.first_chunk;
+    push.end_chunk = batch.end_chunk;
+    commands.push(push);
     const uint32_t chunks = batch.end_chunk - batch.first_chunk;
     const uint32_t groups_x = std::min(chunks, kMaxGroupsX);
     commands.dispatch(groups_x, (chunks + groups_x - 1) / groups_x);
   }
 }
 
-void Gather::Impl::record_raster(gpu::Commands& commands, const scene::SceneInstant& instant, const vec4& eye,
+void Gather::Impl::record_raster(gpu::Commands& commands, const scene::SceneInstant& instant, PassPush push,
                                  const GatherWork& work) {
   if (work.raster_batches.empty()) return;
   const gpu::ColorAttachment atlas{.image = &image};
   commands.begin_rendering({.colors = {&atlas, 1}, .width = settings.width, .height = settings.height});
   for (const RasterBatch& batch : work.raster_batches) {
     commands.bind(raster, {&scene.group(), &instant.group(), &lighting.group(), &groups.of(batch.material)});
-    commands.push(PassPush{eye, settings.width, settings.height, 0, 0});
+    commands.push(push);
     commands.draw(6, batch.block_count, 0, batch.first_block);
   }
   commands.end_rendering();
@@ -163,16 +173,18 @@ StatusOr<std::unique_ptr<Gather>> Gather::create(gpu::Device& device, const scen
   return std::unique_ptr<Gather>(new Gather(std::move(impl)));
 }
 
-Status Gather::record(gpu::Commands& commands, const scene::SceneInstant& instant, const dvec3& eye,
+Status Gather::record(gpu::Commands& commands, const scene::SceneInstant& instant, const View& viewer,
                       std::span<const atlas::Placement> placements) {
   const GatherLimits limits{impl_->settings.width, impl_->settings.height,
                             raster_from_texels(impl_->settings.path)};
   TESSERA_ASSIGN_OR_RETURN(const GatherWork work, build_gather_work(impl_->scene, placements, limits));
   TESSERA_RETURN_IF_ERROR(impl_->upload(work));
-  const vec4 relative_eye(vec3(eye - instant.origin()), 1);
+  PassPush push = pass_of(viewer, instant.origin());
+  push.width = impl_->settings.width;
+  push.height = impl_->settings.height;
   commands.begin_interval("gather");
-  impl_->record_compute(commands, instant, relative_eye, work);
-  impl_->record_raster(commands, instant, relative_eye, work);
+  impl_->record_compute(commands, instant, push, work);
+  impl_->record_raster(commands, instant, push, work);
   commands.barrier();
   commands.end_interval();
   return absl::OkStatus();

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "atlas/placement.h"
+#include "base/view.h"
 #include "gpu/image.h"
 #include "scene/gpu_scene.h"
 #include "shading/lighting.h"
@@ -34,10 +35,11 @@ class Gather {
                                                   const Lighting& lighting, const GatherSettings& settings);
   ~Gather();
 
-  // Shades all `placements` as seen from `eye` (world). Records into `commands`, as the interval "gather" (so
+  // Shades all `placements` as seen by `viewer`: from its eye, with textures filtered for its pixels or for the texels,
+  // whichever are wider. Records into `commands`, as the interval "gather" (so
   // not within another interval) and with a barrier at its end; the same Gather must not be recorded again
   // before that work is done. Masked patches also get their coverage half.
-  Status record(gpu::Commands& commands, const scene::SceneInstant& instant, const dvec3& eye,
+  Status record(gpu::Commands& commands, const scene::SceneInstant& instant, const View& viewer,
                 std::span<const atlas::Placement> placements);
   // After that work is done: sRGB colours of the placements of kind color, in the order of `placements` of
   // record(), 0xBBGGRR.

@@ -16,7 +16,9 @@ const uint kBlockTransposed = 1u << 10, kBlockMasked = 1u << 11, kBlockColor = 1
 layout(set = 3, binding = 1, std430) readonly buffer Blocks { Block blocks[]; };
 
 layout(push_constant) uniform Pass {
-  vec4 eye;  // relative to the instant's origin
+  vec4 eye;            // relative to the instant's origin
+  vec4 axis;           // unit, where the viewer looks
+  vec4 ray_x, ray_y;   // from pixel to pixel, at distance 1 along the axis
   uvec2 atlas_size;
   uint first_chunk, end_chunk;  // compute path
 } pass;
@@ -67,6 +69,23 @@ TrianglePoint block_point(uint count, vec2 at, vec2 extent, out uint triangle) {
   return p;
 }
 
+// How the weights change over a pixel of the viewer: a texel that is finer than the pixel must not carry more detail than
+// the pixel can show, or the client, which has no mip-maps, would alias. Same derivation as triangle_point() in view.glsl.
+void see_point(Triangle t, inout TrianglePoint at) {
+  vec3 from_eye = t.a + at.weights.x * t.edge1 + at.weights.y * t.edge2 - pass.eye.xyz;
+  vec3 to_eye = pass.eye.xyz - t.a;
+  vec3 p = cross(t.edge2, to_eye), q = cross(to_eye, t.edge1), n = cross(t.edge2, t.edge1);
+  // Beside and behind the viewer the distance stands in for the depth; edge-on views are filtered for a slant of 1:20.
+  float range = length(from_eye);
+  float depth = max(dot(from_eye, pass.axis.xyz), 0.25 * range);
+  float det = dot(from_eye, n), least = 0.05 * range * length(n);
+  det = det < 0.0 ? min(det, -least) : max(det, least);
+  float scale = abs(det) > 1e-30 ? depth / det : 0.0;
+  vec2 w = at.weights;
+  at.seen_ddx = (vec2(dot(pass.ray_x.xyz, p), dot(pass.ray_x.xyz, q)) - w * dot(pass.ray_x.xyz, n)) * scale;
+  at.seen_ddy = (vec2(dot(pass.ray_y.xyz, p), dot(pass.ray_y.xyz, q)) - w * dot(pass.ray_y.xyz, n)) * scale;
+}
+
 // Coverage as it travels in the atlas: 0.5 at the cut-off, full swing a quarter of alpha to either side. Steep enough
 // that coding noise moves an edge little, soft enough that bilinear filtering places it between texels.
 float coverage(float alpha, float cutoff) { return clamp(0.5 + 2.0 * (alpha - cutoff), 0.0, 1.0); }
@@ -96,7 +115,8 @@ vec3 block_texel(Block block, uvec2 texel) {
     at = at.yx;
     extent = extent.yx;
   }
-  float footprint = 1.0;
+  // The client's bilinear fetch smooths once more: half a texel's filter keeps the sum near one texel.
+  float footprint = 0.5;
   if ((block.shape & kBlockColor) != 0u) {
     extent = vec2(2.0);
     at = count == 1u ? vec2(2.0 / 3.0) : vec2(1.0);
@@ -108,6 +128,7 @@ vec3 block_texel(Block block, uvec2 texel) {
   point.ddy *= footprint;
   Stand stand = load_stand(block.instance);
   Triangle t = fetch_triangle(stand, block.first_triangle + triangle);
+  see_point(t, point);
   SurfacePoint p = surface_point(stand, t, point);
   MaterialPoint m = material_point(p);
   if (is_coverage) return vec3(srgb_decode(coverage(m.base.a, material.alpha_cutoff)));

@@ -19,7 +19,10 @@ vec4 sample_surface(TextureUse use, SurfacePoint p, vec4 absent) {
   vec2 size = vec2(textureSize(scene_textures[array], 0).xy);
   vec2 dx = size * texture_gradient(use, p.uv0_gradient.xy, p.uv1_gradient.xy);
   vec2 dy = size * texture_gradient(use, p.uv0_gradient.zw, p.uv1_gradient.zw);
-  float level = 0.5 * log2(clamp(max(dot(dx, dx), dot(dy, dy)), 1e-6, 1e12));
+  vec2 seen_dx = size * texture_gradient(use, p.uv0_seen.xy, p.uv1_seen.xy);
+  vec2 seen_dy = size * texture_gradient(use, p.uv0_seen.zw, p.uv1_seen.zw);
+  float widest = max(max(dot(dx, dx), dot(dy, dy)), max(dot(seen_dx, seen_dx), dot(seen_dy, seen_dy)));
+  float level = 0.5 * log2(clamp(widest, 1e-6, 1e12));
   vec3 where = vec3(texture_uv(use, p.uv0, p.uv1), float(use.layer_texcoord & 0xffffu));
   vec4 texel = textureLod(scene_textures[array], where, level);
   return use.array == kNone ? absent : texel;

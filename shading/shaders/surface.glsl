@@ -35,9 +35,11 @@ struct Triangle {
 };
 
 // A place in a triangle: weights of its second and third corner, and how these change along the two axes of the
-// sampling grid (pixels or texels).
+// sampling grid (pixels or texels). `seen_ddx`, `seen_ddy`: along the pixels of the viewer, where that is another grid,
+// else zero. Textures are filtered for the wider of the two.
 struct TrianglePoint {
   vec2 weights, ddx, ddy;
+  vec2 seen_ddx, seen_ddy;
 };
 
 struct SurfacePoint {
@@ -47,6 +49,7 @@ struct SurfacePoint {
   vec4 tangent;           // world direction, w = handedness; zero without normal maps
   vec2 uv0, uv1;
   vec4 uv0_gradient, uv1_gradient;  // ddx, ddy
+  vec4 uv0_seen, uv1_seen;          // seen_ddx, seen_ddy
   vec4 color;
 };
 
@@ -92,6 +95,7 @@ void set_uv0(inout SurfacePoint p, Triangle t, TrianglePoint at) {
   vec2 e2 = vec2(vertices[t.v2].u0, vertices[t.v2].v0) - a;
   p.uv0 = a + at.weights.x * e1 + at.weights.y * e2;
   p.uv0_gradient = vec4(at.ddx.x * e1 + at.ddx.y * e2, at.ddy.x * e1 + at.ddy.y * e2);
+  p.uv0_seen = vec4(at.seen_ddx.x * e1 + at.seen_ddx.y * e2, at.seen_ddy.x * e1 + at.seen_ddy.y * e2);
 }
 
 void set_uv1(inout SurfacePoint p, Triangle t, TrianglePoint at) {
@@ -100,6 +104,7 @@ void set_uv1(inout SurfacePoint p, Triangle t, TrianglePoint at) {
   vec2 e2 = vec2(vertices[t.v2].u1, vertices[t.v2].v1) - a;
   p.uv1 = a + at.weights.x * e1 + at.weights.y * e2;
   p.uv1_gradient = vec4(at.ddx.x * e1 + at.ddx.y * e2, at.ddy.x * e1 + at.ddy.y * e2);
+  p.uv1_seen = vec4(at.seen_ddx.x * e1 + at.seen_ddx.y * e2, at.seen_ddy.x * e1 + at.seen_ddy.y * e2);
 }
 
 // What texture lookups need, and no more: alpha tests stop here.
@@ -109,6 +114,7 @@ SurfacePoint texture_point(Triangle t, TrianglePoint at) {
   set_uv0(p, t, at);
   p.uv1 = vec2(0.0);
   p.uv1_gradient = vec4(0.0);
+  p.uv1_seen = vec4(0.0);
   if (kSecondTexcoord) set_uv1(p, t, at);
   p.color = vec4(1.0);
   if (kVertexColors) p.color = interpolate_color(t, at.weights);

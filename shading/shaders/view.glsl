@@ -39,6 +39,8 @@ TrianglePoint triangle_point(Triangle t, vec2 pixel) {
   at.ddy = (vec2(dot(view.ray_y.xyz, p), dot(view.ray_y.xyz, q)) - w * dot(view.ray_y.xyz, n)) * inverse;
   w.x = clamp(w.x, 0.0, 1.0);
   at.weights = vec2(w.x, clamp(w.y, 0.0, 1.0 - w.x));
+  at.seen_ddx = vec2(0.0);
+  at.seen_ddy = vec2(0.0);
   return at;
 }
 

@@ -51,9 +51,8 @@ struct Fixture : testing::Test {
   }();
 
   gc::MetaFrame build(FrameNumber frame, const atlas::LayoutDelta& delta, const std::vector<atlas::Placement>& all,
-                      std::vector<uint32_t> colors = {}) {
-    colors.resize(all.size());
-    return builder.build(frame, delta, all, colors, transforms);
+                      const std::vector<uint32_t>& colors = {}) {
+    return builder.build(frame, delta, {all, colors}, transforms);
   }
 };
 
@@ -125,7 +124,9 @@ TEST_F(Fixture, MovingObjectsAreSentWhenTheyMoved) {
 }
 
 TEST_F(Fixture, EveryPacketDecodesToItself) {
-  const auto first = build(7, {.changed = {block(0, 0), color(1)}}, {block(0, 0), color(1)}, {0, 0x123456});
+  const auto first = build(7, {.changed = {block(0, 0), color(1)}}, {block(0, 0), color(1)}, {0x123456});
+  ASSERT_EQ(first.placements.size(), 2u);
+  EXPECT_EQ(first.placements[1].rgb, 0x123456u) << "colours count the single-colour placements only";
   gc::MetaFrame decoded;
   EXPECT_EQ(gc::decode(gc::encode(first), decoded), "");
   EXPECT_EQ(decoded, first);

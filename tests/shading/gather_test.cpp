@@ -262,7 +262,7 @@ TEST(Gather, AnEmptyLayoutDispatchesNothing) {
   ASSERT_TRUE(gather.ok());
   const uint64_t draws = device().draws_recorded(), dispatches = device().dispatches_recorded();
   gpu::Commands commands = device().begin();
-  ASSERT_TRUE((*gather)->record(commands, *world.instant, {}, {}).ok());
+  ASSERT_TRUE((*gather)->record(commands, *world.instant, look({}, {0, 0, -1}), {}).ok());
   ASSERT_TRUE(device().run(std::move(commands)).ok());
   EXPECT_EQ((*gather)->stats().samples, 0u);
   EXPECT_EQ(device().draws_recorded(), draws);
@@ -279,7 +279,7 @@ TEST(Gather, RefusesPlacementsThatLeaveTheAtlasOrTheScene) {
   for (const Placement& p : {block(1, 0, 0, 2, 2), block(0, 14, 0, 2, 2), block(0, 0, 14, 2, 2),
                              block(0, 0, 0, 40, 2), Placement{.patch = scene::kNone}}) {
     gpu::Commands commands = device().begin();
-    EXPECT_EQ((*gather)->record(commands, *world.instant, {}, {&p, 1}).code(),
+    EXPECT_EQ((*gather)->record(commands, *world.instant, look({}, {0, 0, -1}), {&p, 1}).code(),
               absl::StatusCode::kInvalidArgument);
   }
 }

@@ -75,7 +75,10 @@ GatherResult gather(const World& world, const dvec3& eye, std::span<const atlas:
   auto readback = value(gpu::Buffer::create(device(), uint64_t{4} * settings.width * settings.height,
                                             gpu::Memory::readback, "test atlas"));
   gpu::Commands commands = device().begin();
-  check(gather->record(commands, *world.instant, eye, placements));
+  // Pixels much finer than any texel: textures are filtered for the texels.
+  View viewer{.fov = Fov::symmetric(0.5f, 1), .width = 1u << 20, .height = 1u << 20};
+  viewer.pose.position = eye;
+  check(gather->record(commands, *world.instant, viewer, placements));
   commands.copy_to_buffer(gather->image(), readback);
   commands.barrier();
   check(device().run(std::move(commands)));
