@@ -91,6 +91,17 @@ LayoutDelta difference(std::span<const Placement> before, std::span<const Placem
 
 }  // namespace
 
+LayoutSettings settings_for(uint32_t width, uint32_t height) {
+  constexpr uint64_t kLeastSuperblocks = 64;
+  LayoutSettings settings{.width = width, .height = height};
+  while (settings.superblock_log > kMinLog &&
+         ((uint64_t{width} * height) >> (2 * settings.superblock_log)) < kLeastSuperblocks) {
+    --settings.superblock_log;
+  }
+  settings.levels.max_log = settings.superblock_log;
+  return settings;
+}
+
 struct Layout::Impl {
   Impl(const scene::Scene& scene, const LayoutSettings& s)
       : settings(s),
