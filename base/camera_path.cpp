@@ -16,16 +16,18 @@ constexpr size_t kColumns = 8;
 StatusOr<TimedPose> parse_line(const std::string& line, const std::string& where) {
   const std::vector<absl::string_view> cells = absl::StrSplit(absl::StripTrailingAsciiWhitespace(line), ',');
   if (cells.size() != kColumns) {
-    return absl::InvalidArgumentError(
-        absl::StrFormat("%s: %d columns, expected %d (t_seconds,px,py,pz,qx,qy,qz,qw)", where, cells.size(), kColumns));
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "%s: %d columns, expected %d (t_seconds,px,py,pz,qx,qy,qz,qw)", where, cells.size(), kColumns));
   }
   std::array<double, kColumns> v;
   for (size_t i = 0; i < kColumns; ++i) {
     if (!absl::SimpleAtod(cells[i], &v[i]) || !std::isfinite(v[i])) {
-      return absl::InvalidArgumentError(absl::StrFormat("%s: column %d is not a finite number", where, i + 1));
+      return absl::InvalidArgumentError(
+          absl::StrFormat("%s: column %d is not a finite number", where, i + 1));
     }
   }
-  if (std::abs(v[0]) > 1e9) return absl::InvalidArgumentError(absl::StrCat(where, ": time is out of range (1e9 s)"));
+  if (std::abs(v[0]) > 1e9)
+    return absl::InvalidArgumentError(absl::StrCat(where, ": time is out of range (1e9 s)"));
   const Pose pose{dvec3(v[1], v[2], v[3]), dquat(v[7], v[4], v[5], v[6])};
   return TimedPose{from_seconds(v[0]), normalized(pose)};
 }
@@ -60,7 +62,8 @@ Pose CameraPath::at(TimeNs time_ns) const {
   if (after == poses_.begin()) return poses_.front().pose;
   if (after == poses_.end()) return poses_.back().pose;
   const TimedPose &a = after[-1], &b = *after;
-  return interpolate(a.pose, b.pose, static_cast<double>(time_ns - a.time_ns) / static_cast<double>(b.time_ns - a.time_ns));
+  return interpolate(a.pose, b.pose,
+                     static_cast<double>(time_ns - a.time_ns) / static_cast<double>(b.time_ns - a.time_ns));
 }
 
 }  // namespace tessera

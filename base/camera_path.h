@@ -10,8 +10,9 @@
 
 namespace tessera {
 
-// Header line `t_seconds,px,py,pz,qx,qy,qz,qw`, then one pose a line; times strictly increase, in seconds. Any value
-// that is not finite, a time that does not increase, or a wrong column count is an error that names the line.
+// Header line `t_seconds,px,py,pz,qx,qy,qz,qw`, then one pose a line; times strictly increase, in seconds.
+// Any value that is not finite, a time that does not increase, or a wrong column count is an error that names
+// the line.
 class CameraPath {
  public:
   static StatusOr<CameraPath> load(const std::filesystem::path& file);

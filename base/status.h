@@ -1,4 +1,5 @@
-// Errors between rooms: absl::Status and StatusOr. A message says what failed, where, and what to do about it.
+// Errors between rooms: absl::Status and StatusOr. A message says what failed, where, and what to do about
+// it.
 #pragma once
 
 #include "absl/status/status.h"
@@ -17,8 +18,8 @@ using absl::StatusOr;
 #define TESSERA_CONCAT(a, b) TESSERA_CONCAT_INNER(a, b)
 
 // Returns from the enclosing function when `expr` (a Status) is an error.
-#define TESSERA_RETURN_IF_ERROR(expr)                                 \
-  do {                                                                \
+#define TESSERA_RETURN_IF_ERROR(expr)                                   \
+  do {                                                                  \
     if (::absl::Status status_ = (expr); !status_.ok()) return status_; \
   } while (false)
 

@@ -1,5 +1,5 @@
-// Time is int64 nanoseconds since an arbitrary start, as in OpenXR. It comes from an injectable clock, so that the
-// same code runs in real time and in virtual time.
+// Time is int64 nanoseconds since an arbitrary start, as in OpenXR. It comes from an injectable clock, so
+// that the same code runs in real time and in virtual time.
 #pragma once
 
 #include <chrono>
@@ -13,10 +13,18 @@ using DurationNs = int64_t;
 constexpr DurationNs kNsPerMs = 1'000'000;
 constexpr DurationNs kNsPerSecond = 1'000'000'000;
 
-constexpr double to_seconds(DurationNs ns) { return static_cast<double>(ns) * 1e-9; }
-constexpr double to_ms(DurationNs ns) { return static_cast<double>(ns) * 1e-6; }
-constexpr DurationNs from_seconds(double s) { return static_cast<DurationNs>(s * 1e9 + (s < 0 ? -0.5 : 0.5)); }
-constexpr DurationNs from_ms(double ms) { return from_seconds(ms * 1e-3); }
+constexpr double to_seconds(DurationNs ns) {
+  return static_cast<double>(ns) * 1e-9;
+}
+constexpr double to_ms(DurationNs ns) {
+  return static_cast<double>(ns) * 1e-6;
+}
+constexpr DurationNs from_seconds(double s) {
+  return static_cast<DurationNs>(s * 1e9 + (s < 0 ? -0.5 : 0.5));
+}
+constexpr DurationNs from_ms(double ms) {
+  return from_seconds(ms * 1e-3);
+}
 
 class Clock {
  public:
@@ -28,7 +36,9 @@ class Clock {
 class SteadyClock final : public Clock {
  public:
   TimeNs now() const override {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(
+               std::chrono::steady_clock::now().time_since_epoch())
+        .count();
   }
 };
 

@@ -6,7 +6,9 @@
 namespace tessera {
 namespace {
 
-bool is_finite(double v) { return std::isfinite(v); }
+bool is_finite(double v) {
+  return std::isfinite(v);
+}
 
 float widen(float tangent, float by_rad) {
   constexpr float kMaxHalfAngle = 89.5f * 3.14159265f / 180.0f;
@@ -46,14 +48,20 @@ Fov Fov::symmetric(float fov_y_rad, float aspect) {
 }
 
 Fov Fov::widened(float horizontal_rad, float vertical_rad) const {
-  return {widen(left, -horizontal_rad), widen(right, horizontal_rad), widen(down, -vertical_rad), widen(up, vertical_rad)};
+  return {widen(left, -horizontal_rad), widen(right, horizontal_rad), widen(down, -vertical_rad),
+          widen(up, vertical_rad)};
 }
 
-float Fov::width_rad() const { return std::atan(right) - std::atan(left); }
-float Fov::height_rad() const { return std::atan(up) - std::atan(down); }
+float Fov::width_rad() const {
+  return std::atan(right) - std::atan(left);
+}
+float Fov::height_rad() const {
+  return std::atan(up) - std::atan(down);
+}
 
 float View::pixels_per_radian() const {
-  return 0.5f * (static_cast<float>(width) / (fov.right - fov.left) + static_cast<float>(height) / (fov.up - fov.down));
+  return 0.5f * (static_cast<float>(width) / (fov.right - fov.left) +
+                 static_cast<float>(height) / (fov.up - fov.down));
 }
 
 mat4 projection_matrix(const Fov& fov, float near_m) {

@@ -8,8 +8,8 @@
 
 namespace tessera {
 
-// Camera-to-world. Metres, scene coordinates; the camera looks along its -Z with +Y up. The orientation is a unit
-// quaternion; make one safe with normalized().
+// Camera-to-world. Metres, scene coordinates; the camera looks along its -Z with +Y up. The orientation is a
+// unit quaternion; make one safe with normalized().
 struct Pose {
   dvec3 position{0.0};
   dquat orientation{1.0, 0.0, 0.0, 0.0};
@@ -23,15 +23,15 @@ struct TimedPose {
   Pose pose;
 };
 
-// The pose with its quaternion brought to unit length. A zero or non-finite quaternion becomes the identity; non-finite
-// position components become 0.
+// The pose with its quaternion brought to unit length. A zero or non-finite quaternion becomes the identity;
+// non-finite position components become 0.
 Pose normalized(const Pose& pose);
 
 // Position: linear; orientation: slerp along the shorter arc. `t` outside [0, 1] extrapolates.
 Pose interpolate(const Pose& a, const Pose& b, double t);
 
-// An asymmetric frustum by the tangents of its four half angles; left and down are negative for a view that contains
-// its axis. Fields of view from 1 to 179 degrees are supported.
+// An asymmetric frustum by the tangents of its four half angles; left and down are negative for a view that
+// contains its axis. Fields of view from 1 to 179 degrees are supported.
 struct Fov {
   float left = -1, right = 1, down = -1, up = 1;
 
@@ -55,11 +55,12 @@ struct View {
   float pixels_per_radian() const;
 };
 
-// Reversed-Z with an infinite far plane: depth 1 at near_m, 0 at infinity. +Y up in clip space: Vulkan passes use a
-// viewport of negative height, so the same matrix serves both graphics interfaces.
+// Reversed-Z with an infinite far plane: depth 1 at near_m, 0 at infinity. +Y up in clip space: Vulkan passes
+// use a viewport of negative height, so the same matrix serves both graphics interfaces.
 mat4 projection_matrix(const Fov& fov, float near_m);
 
-// World-to-camera for positions that are relative to `origin` (camera-relative rendering: the subtraction is in double).
+// World-to-camera for positions that are relative to `origin` (camera-relative rendering: the subtraction is
+// in double).
 mat4 view_matrix(const Pose& pose, const dvec3& origin);
 
 // projection * view, for positions relative to `origin`.

@@ -7,14 +7,15 @@
 
 namespace tessera {
 
-// I420: three planes without padding; BT.709, limited ("TV") range. Width and height are even. Chroma is sited at the
-// centre of each 2x2 square of luma, so that a 2-aligned block owns its chroma samples.
+// I420: three planes without padding; BT.709, limited ("TV") range. Width and height are even. Chroma is
+// sited at the centre of each 2x2 square of luma, so that a 2-aligned block owns its chroma samples.
 struct YuvImage {
   uint32_t width = 0, height = 0;
   std::vector<uint8_t> y, u, v;
 };
 
-// A view of I420 planes that somebody else owns (a mapped readback buffer, a decoder's frame). Strides in bytes.
+// A view of I420 planes that somebody else owns (a mapped readback buffer, a decoder's frame). Strides in
+// bytes.
 struct YuvView {
   uint32_t width = 0, height = 0;
   const uint8_t* y = nullptr;

@@ -102,7 +102,9 @@ Status PictureStreamer::deliver(Channel, std::span<const uint8_t> bytes) {
   return impl_->warp->set_source(source.view, impl_->picture, source.depth);
 }
 
-bool PictureStreamer::wants_key_frame() const { return impl_->broken; }
+bool PictureStreamer::wants_key_frame() const {
+  return impl_->broken;
+}
 
 std::optional<FrameNumber> PictureStreamer::newest_frame() {
   return impl_->arrived;

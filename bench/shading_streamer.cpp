@@ -175,7 +175,8 @@ StatusOr<std::vector<Packet>> ShadingStreamer::serve(const ServeRequest& request
 Status ShadingStreamer::deliver(Channel channel, std::span<const uint8_t> bytes) {
   if (channel == Channel::meta) return impl_->core->on_meta(bytes);
   // Late or missing pictures are part of a network: the core counts them and asks for a key frame.
-  if (const Status status = impl_->core->on_atlas(bytes); !status.ok()) spdlog::debug("client: {}", status.ToString());
+  if (const Status status = impl_->core->on_atlas(bytes); !status.ok())
+    spdlog::debug("client: {}", status.ToString());
   return absl::OkStatus();
 }
 
@@ -206,8 +207,7 @@ StatusOr<Image8> ShadingStreamer::draw_fresh(const View& view, const scene::Scen
   gpu::Device& device = impl_->scene->device();
   TESSERA_RETURN_IF_ERROR(impl_->scene->lighting().update(instant));
   gpu::Commands commands = device.begin();
-  TESSERA_RETURN_IF_ERROR(
-      impl_->fresh_gather->record(commands, instant, view, impl_->current().placements));
+  TESSERA_RETURN_IF_ERROR(impl_->fresh_gather->record(commands, instant, view, impl_->current().placements));
   TESSERA_RETURN_IF_ERROR(device.run(std::move(commands)));
   TESSERA_ASSIGN_OR_RETURN(const Image8 atlas, impl_->reader->read(impl_->fresh_gather->image()));
   return impl_->draw(atlas, view);

@@ -1,5 +1,5 @@
-// The client without its windows and sockets: access units and meta packets in, complete pairs out. The same code runs over
-// sockets and in virtual time.
+// The client without its windows and sockets: access units and meta packets in, complete pairs out. The same
+// code runs over sockets and in virtual time.
 #pragma once
 
 #include <cstdint>
@@ -15,10 +15,10 @@
 namespace tessera::client {
 
 struct ClientStats {
-  uint64_t pairs = 0;             // complete pairs handed to the display side
+  uint64_t pairs = 0;  // complete pairs handed to the display side
   uint64_t atlas_frames = 0, meta_frames = 0;
   uint64_t decode_errors = 0;
-  uint64_t pairs_skipped = 0;     // replaced by a newer pair before they were drawn
+  uint64_t pairs_skipped = 0;  // replaced by a newer pair before they were drawn
   FrameNumber newest_pair = 0;
 };
 
@@ -29,11 +29,12 @@ struct Pair {
   SceneState state;
 };
 
-// on_* may be called from one receiving thread while take_newest() is called from one drawing thread; they meet in a triple
-// buffer and never wait for each other.
+// on_* may be called from one receiving thread while take_newest() is called from one drawing thread; they
+// meet in a triple buffer and never wait for each other.
 //
-// Rules (docs/architecture.md): only complete pairs are shown, newest first. Meta frames apply in order and each exactly
-// once. An atlas whose decoding chain is broken is never part of a pair; the core then wants a key frame.
+// Rules (docs/architecture.md): only complete pairs are shown, newest first. Meta frames apply in order and
+// each exactly once. An atlas whose decoding chain is broken is never part of a pair; the core then wants a
+// key frame.
 class ClientCore {
  public:
   static StatusOr<std::unique_ptr<ClientCore>> create();
@@ -41,8 +42,8 @@ class ClientCore {
 
   // One whole H.264 access unit. An error is counted and returned, and leaves the core usable.
   Status on_atlas(std::span<const uint8_t> access_unit);
-  // One whole meta packet. Packets must come in frame order (the channel is reliable); a damaged one is an error that ends
-  // the session's state until a packet with full_state.
+  // One whole meta packet. Packets must come in frame order (the channel is reliable); a damaged one is an
+  // error that ends the session's state until a packet with full_state.
   Status on_meta(std::span<const uint8_t> packet);
   // True from a broken video chain until the next key frame has been decoded.
   bool wants_key_frame() const;

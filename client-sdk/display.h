@@ -1,5 +1,5 @@
-// Draws a SceneState with its atlas at the newest pose: EGL surfaceless, OpenGL ES 3.0, 4x MSAA, record per primitive
-// (no vertex buffers: texelFetch(records, gl_VertexID / 3)).
+// Draws a SceneState with its atlas at the newest pose: EGL surfaceless, OpenGL ES 3.0, 4x MSAA, record per
+// primitive (no vertex buffers: texelFetch(records, gl_VertexID / 3)).
 #pragma once
 
 #include <array>
@@ -28,8 +28,8 @@ class Display {
   static StatusOr<std::unique_ptr<Display>> create(const DisplaySettings& settings);
   ~Display();
 
-  // Uploads what changed since the last call with the same object. `atlas` is converted to RGB on the device, chroma
-  // replicated (never filtered across blocks).
+  // Uploads what changed since the last call with the same object. `atlas` is converted to RGB on the device,
+  // chroma replicated (never filtered across blocks).
   Status set_atlas(const YuvView& atlas);
   Status set_atlas(const Image8& atlas);  // uncoded, for the harness
   Status set_state(const SceneState& state);

@@ -1,4 +1,5 @@
-// What the client knows of the scene, in the form its GPU reads: one 16-byte record a triangle (docs/protocol.md).
+// What the client knows of the scene, in the form its GPU reads: one 16-byte record a triangle
+// (docs/protocol.md).
 #pragma once
 
 #include <array>
@@ -15,10 +16,11 @@ namespace tessera::client {
 //   a: vertex0 (22) | corner kind (3) | transposed (1) | masked (1) | reversed (1)
 //   b: vertex1 (22) | object bits 0..9 (10)
 //   c: vertex2 (22) | object bits 10..19 (10)
-//   d: block: x/2 (12) | y/2 (12) | log_w (3, minus 1) | log_h (3, minus 1) | 0 (2);  colour: 0xBBGGRR (24) | 0 (7) | 1
-// Corner kind: 0 = lone triangle; 1, 2 = of a pair; 3, 4, 5 = of three. It belongs to the stored order of the vertices.
-// Reversed: the corners are visited in the order 0, 2, 1, which undoes the winding of a mirrored object; vertices and block
-// coordinates swap together, so the corner kind needs no mirrored twin.
+//   d: block: x/2 (12) | y/2 (12) | log_w (3, minus 1) | log_h (3, minus 1) | 0 (2);  colour: 0xBBGGRR (24) |
+//   0 (7) | 1
+// Corner kind: 0 = lone triangle; 1, 2 = of a pair; 3, 4, 5 = of three. It belongs to the stored order of the
+// vertices. Reversed: the corners are visited in the order 0, 2, 1, which undoes the winding of a mirrored
+// object; vertices and block coordinates swap together, so the corner kind needs no mirrored twin.
 struct TriangleRecord {
   uint32_t a, b, c, d;
   bool operator==(const TriangleRecord&) const = default;
@@ -49,12 +51,12 @@ struct ObjectState {
 enum class RecordGroup : uint8_t { single_sided, double_sided, masked_single_sided, masked_double_sided };
 constexpr int kRecordGroups = 4;
 
-// The state after the meta packet of `frame`. Kept by SceneStore; copied into a Pair when its atlas has arrived. Within an
-// epoch vertices and objects are only appended.
+// The state after the meta packet of `frame`. Kept by SceneStore; copied into a Pair when its atlas has
+// arrived. Within an epoch vertices and objects are only appended.
 struct SceneState {
   uint32_t frame = 0;
   uint16_t atlas_width = 0, atlas_height = 0;
-  uint32_t epoch = 0;  // grows with every full_state: everything is new
+  uint32_t epoch = 0;                // grows with every full_state: everything is new
   std::vector<vec3> vertices;        // mesh space (dequantised), by vertex id
   std::vector<ObjectState> objects;  // by object id
   std::array<std::vector<TriangleRecord>, kRecordGroups> records;  // of visible patches

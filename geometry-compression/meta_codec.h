@@ -1,4 +1,5 @@
-// MetaFrame ⇄ bits: deltas and exp-Golomb codes. Packets are self-contained: nothing is predicted from another packet.
+// MetaFrame ⇄ bits: deltas and exp-Golomb codes. Packets are self-contained: nothing is predicted from
+// another packet.
 #pragma once
 
 #include <cstdint>
@@ -27,8 +28,8 @@ struct MetaLimits {
   uint32_t max_patches = 1u << 22;
 };
 
-// Safe for untrusted input: bounded time and memory (allocation grows with the bytes read, not with what they claim).
-// Returns an empty string, or what is wrong and where; `out` is then unspecified.
+// Safe for untrusted input: bounded time and memory (allocation grows with the bytes read, not with what they
+// claim). Returns an empty string, or what is wrong and where; `out` is then unspecified.
 std::string decode(std::span<const uint8_t> bytes, MetaFrame& out, const MetaLimits& limits = {});
 
 }  // namespace tessera::geometry_compression

@@ -1,8 +1,9 @@
-// What the client must know beside the atlas to draw frame N: new meshes, vertices, objects and patches, moved objects,
-// and changed placements. Plain values; bits in meta_codec.h; format in docs/meta-format.md. Standard library only.
+// What the client must know beside the atlas to draw frame N: new meshes, vertices, objects and patches,
+// moved objects, and changed placements. Plain values; bits in meta_codec.h; format in docs/meta-format.md.
+// Standard library only.
 //
-// Ids are dense and count from 0 in order of transmission, so new things carry no id. The client keeps everything that it
-// was ever sent in a session; a patch that is not visible has placement kind `none`.
+// Ids are dense and count from 0 in order of transmission, so new things carry no id. The client keeps
+// everything that it was ever sent in a session; a patch that is not visible has placement kind `none`.
 #pragma once
 
 #include <array>
@@ -33,9 +34,9 @@ struct Transform {
 
 struct NewObject {
   Transform transform;
-  bool mirrored = false;      // the transform reverses the winding
+  bool mirrored = false;  // the transform reverses the winding
   bool double_sided = false;
-  bool masked = false;        // its patches have coverage
+  bool masked = false;  // its patches have coverage
   bool operator==(const NewObject&) const = default;
 };
 
@@ -49,8 +50,8 @@ struct MovedObject {
 //   1 triangle: (0,0) (1,0) (0,1)   2: + (1,1)   3: (0,0) (1,0) (.5,1) (0,1) (1,1)
 struct NewPatch {
   uint32_t object = 0;
-  uint8_t triangles = 1;                 // 1..3
-  std::array<uint32_t, 5> vertices{};    // vertex ids; the first triangles + 2 are used, the rest 0
+  uint8_t triangles = 1;               // 1..3
+  std::array<uint32_t, 5> vertices{};  // vertex ids; the first triangles + 2 are used, the rest 0
   bool operator==(const NewPatch&) const = default;
 };
 
@@ -59,10 +60,10 @@ enum class PlacementKind : uint8_t { none = 0, block = 1, color = 2 };
 struct PatchPlacement {
   uint32_t patch = 0;
   PlacementKind kind = PlacementKind::none;
-  uint16_t x = 0, y = 0;          // kind block: texels, even, < 8192
-  uint8_t log_w = 0, log_h = 0;   // kind block: 1..8
-  bool transposed = false;        // kind block
-  uint32_t rgb = 0;               // kind color: 0xBBGGRR, sRGB
+  uint16_t x = 0, y = 0;         // kind block: texels, even, < 8192
+  uint8_t log_w = 0, log_h = 0;  // kind block: 1..8
+  bool transposed = false;       // kind block
+  uint32_t rgb = 0;              // kind color: 0xBBGGRR, sRGB
   bool operator==(const PatchPlacement&) const = default;
 };
 
@@ -74,7 +75,7 @@ struct MetaFrame {
   std::vector<NewMesh> meshes;
   std::vector<NewVertex> vertices;
   std::vector<NewObject> objects;
-  std::vector<MovedObject> moved;      // sorted by object
+  std::vector<MovedObject> moved;  // sorted by object
   std::vector<NewPatch> patches;
   std::vector<PatchPlacement> placements;  // sorted by patch, each once
   bool operator==(const MetaFrame&) const = default;

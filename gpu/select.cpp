@@ -1,7 +1,7 @@
 // The instance, and the choice among its devices.
-#include <cstdlib>
 #include <algorithm>
 #include <charconv>
+#include <cstdlib>
 #include <optional>
 
 #include "absl/strings/ascii.h"
@@ -89,10 +89,12 @@ std::optional<size_t> find_device(const std::vector<vk::raii::PhysicalDevice>& d
   return best;
 }
 
-// Mesa's software device (22.3, LLVM 15) crashes in its 8-bit texture filters when a compute shader chooses a texture at
-// run time; its float filters are sound, and more exact. The variable must stand before the driver is loaded; whoever has
-// set it keeps their value.
-void avoid_broken_software_filters() { setenv("GALLIVM_PERF", "no_aos_sampling", /*overwrite=*/0); }
+// Mesa's software device (22.3, LLVM 15) crashes in its 8-bit texture filters when a compute shader chooses a
+// texture at run time; its float filters are sound, and more exact. The variable must stand before the driver
+// is loaded; whoever has set it keeps their value.
+void avoid_broken_software_filters() {
+  setenv("GALLIVM_PERF", "no_aos_sampling", /*overwrite=*/0);
+}
 
 }  // namespace
 

@@ -1,5 +1,6 @@
-// A scene on the device. GpuScene is uploaded once and shared by all sessions; SceneInstant is the scene at one time
-// with its transforms relative to one origin (camera-relative rendering), one a session and frame in flight.
+// A scene on the device. GpuScene is uploaded once and shared by all sessions; SceneInstant is the scene at
+// one time with its transforms relative to one origin (camera-relative rendering), one a session and frame in
+// flight.
 #pragma once
 
 #include <memory>
@@ -13,8 +14,8 @@
 namespace tessera::scene {
 
 // Descriptor set 0 in every pass that touches the scene: see scene/shaders/scene.glsl for the bindings.
-// Holds vertices, indices, patches, meshlets, materials and textures (2D arrays by size and format, so their number is
-// not limited by the device's bindings).
+// Holds vertices, indices, patches, meshlets, materials and textures (2D arrays by size and format, so their
+// number is not limited by the device's bindings).
 class GpuScene {
  public:
   static StatusOr<std::unique_ptr<GpuScene>> create(gpu::Device& device, std::shared_ptr<const Scene> scene);
@@ -45,7 +46,8 @@ class SceneInstant {
   static StatusOr<std::unique_ptr<SceneInstant>> create(gpu::Device& device, const GpuScene& scene);
   ~SceneInstant();
 
-  // Writes the transforms for `time_ns` relative to `origin`. Must not overlap GPU work that reads this instant.
+  // Writes the transforms for `time_ns` relative to `origin`. Must not overlap GPU work that reads this
+  // instant.
   void set(TimeNs time_ns, const dvec3& origin);
   const dvec3& origin() const;
   TimeNs time_ns() const;

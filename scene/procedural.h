@@ -11,8 +11,9 @@
 
 namespace tessera::scene {
 
-// A hall with columns, thin pipes and railings (slanted triangles), moving rigid parts, a fence and leaves with alpha
-// masks, and many lights. `detail` in 0..2 scales the triangle count (about 5k, 30k, 200k). Procedural textures.
+// A hall with columns, thin pipes and railings (slanted triangles), moving rigid parts, a fence and leaves
+// with alpha masks, and many lights. `detail` in 0..2 scales the triangle count (about 5k, 30k, 200k).
+// Procedural textures.
 std::shared_ptr<Scene> make_gallery(int detail = 1);
 // A walk through the gallery with head turns, 60 poses a second.
 CameraPath gallery_path();

@@ -1,5 +1,6 @@
-// A scene as the rest of the house sees it, after import: geometries cut into meshlets and patches, instances that
-// place them, materials, textures, lights, animations. Plain values; immutable after import but for animation.
+// A scene as the rest of the house sees it, after import: geometries cut into meshlets and patches, instances
+// that place them, materials, textures, lights, animations. Plain values; immutable after import but for
+// animation.
 #pragma once
 
 #include <array>
@@ -30,8 +31,8 @@ struct Vertex {
 };
 static_assert(sizeof(Vertex) == 64);
 
-// 1 to 3 adjacent triangles that share one rectangular block of the atlas (thesis fig. 3.3, 3.4). Corners (u to the
-// right, v down) and triangles, always in this order and with the winding of the source:
+// 1 to 3 adjacent triangles that share one rectangular block of the atlas (thesis fig. 3.3, 3.4). Corners (u
+// to the right, v down) and triangles, always in this order and with the winding of the source:
 //   1 triangle   (0,0) (1,0) (0,1)
 //   2 triangles  + (1,1) (0,1) (1,0)                    the two share the edge (1,0)-(0,1)
 //   3 triangles  (0,0) (1,0) (.5,1);  (0,1) (0,0) (.5,1);  (1,0) (1,1) (.5,1)
@@ -50,8 +51,8 @@ struct Meshlet {
 };
 constexpr uint32_t kMeshletTriangles = 124;
 
-// One glTF primitive: triangles of one material slot. Shared by all instances that place it. Triangles are ordered by
-// meshlet, then by patch.
+// One glTF primitive: triangles of one material slot. Shared by all instances that place it. Triangles are
+// ordered by meshlet, then by patch.
 struct Geometry {
   std::string name;
   std::vector<Vertex> vertices;
@@ -66,8 +67,8 @@ enum class AlphaMode : uint32_t { opaque, mask, blend };  // blend is drawn opaq
 
 // KHR_texture_transform is folded into `uv_from_texcoord`.
 struct TextureRef {
-  uint32_t texture = kNone;  // index into Scene::textures
-  uint32_t texcoord = 0;     // 0 or 1
+  uint32_t texture = kNone;                                                  // index into Scene::textures
+  uint32_t texcoord = 0;                                                     // 0 or 1
   std::array<vec2, 3> uv_from_texcoord{vec2(1, 0), vec2(0, 1), vec2(0, 0)};  // columns of a 2x3 affine map
 };
 
@@ -81,7 +82,8 @@ struct Material {
   float alpha_cutoff = 0.5f;
   bool double_sided = false;
   bool unlit = false;
-  TextureRef base_color_texture, metallic_roughness_texture, normal_texture, emissive_texture, occlusion_texture;
+  TextureRef base_color_texture, metallic_roughness_texture, normal_texture, emissive_texture,
+      occlusion_texture;
 };
 
 enum class WrapMode : uint32_t { repeat, mirrored_repeat, clamp_to_edge };
@@ -130,8 +132,9 @@ struct AnimationChannel {
   uint32_t node;
   AnimationPath path;
   Interpolation interpolation;
-  std::vector<double> times_s;   // strictly increasing
-  std::vector<vec4> values;      // one a key (three with cubic_spline: in-tangent, value, out-tangent); rotation = xyzw
+  std::vector<double> times_s;  // strictly increasing
+  std::vector<vec4>
+      values;  // one a key (three with cubic_spline: in-tangent, value, out-tangent); rotation = xyzw
 };
 
 // What the scene contains, for the frame plan: a pass that nothing needs is left out.
@@ -159,7 +162,8 @@ struct Scene {
   uint32_t patch_count = 0;     // over all instances
   uint32_t triangle_count = 0;  // over all instances
 
-  // Fills in Instance::first_patch, first_triangle, the counts above and `features`. Call once, after all else is set.
+  // Fills in Instance::first_patch, first_triangle, the counts above and `features`. Call once, after all
+  // else is set.
   void index_instances();
   // The instance that owns a patch (binary search).
   uint32_t instance_of(PatchId patch) const;

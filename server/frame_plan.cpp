@@ -18,7 +18,8 @@ PlannedPass needed(const std::string& name, bool is_needed, const std::string& w
 }  // namespace
 
 bool FramePlan::includes(const std::string& name) const {
-  const auto pass = std::find_if(passes.begin(), passes.end(), [&](const PlannedPass& p) { return p.name == name; });
+  const auto pass =
+      std::find_if(passes.begin(), passes.end(), [&](const PlannedPass& p) { return p.name == name; });
   return pass != passes.end() && pass->included;
 }
 

@@ -1,5 +1,5 @@
-// The passes of a session's frame, each with the reason why it is in or out. What a scene or a session does not need is
-// left out: it allocates nothing and costs nothing.
+// The passes of a session's frame, each with the reason why it is in or out. What a scene or a session does
+// not need is left out: it allocates nothing and costs nothing.
 #pragma once
 
 #include <string>

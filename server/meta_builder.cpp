@@ -16,7 +16,9 @@ namespace {
 
 constexpr uint32_t kRgb = 0xffffffu;
 
-bool is_color(const atlas::Placement& p) { return p.kind == atlas::PlacementKind::color; }
+bool is_color(const atlas::Placement& p) {
+  return p.kind == atlas::PlacementKind::color;
+}
 
 gc::Transform to_wire(const dmat4& matrix) {
   gc::Transform t;
@@ -69,12 +71,12 @@ struct MetaBuilder::Impl {
 
   const scene::Scene& scene;
   MetaSettings settings;
-  std::vector<Mesh> meshes;           // by geometry
-  std::vector<double> scales;         // by geometry: largest scale of its instances
-  std::vector<uint32_t> object_ids;   // by instance
+  std::vector<Mesh> meshes;                    // by geometry
+  std::vector<double> scales;                  // by geometry: largest scale of its instances
+  std::vector<uint32_t> object_ids;            // by instance
   std::vector<gc::Transform> sent_transforms;  // by instance, of those that move
-  std::vector<uint32_t> patch_ids;    // by PatchId
-  std::vector<uint32_t> sent_colors;  // by wire patch id; kNone = not shown as a colour
+  std::vector<uint32_t> patch_ids;             // by PatchId
+  std::vector<uint32_t> sent_colors;           // by wire patch id; kNone = not shown as a colour
   uint32_t next_mesh = 0, next_vertex = 0, next_object = 0, next_patch = 0;
   bool first = true;
 
@@ -102,7 +104,8 @@ struct MetaBuilder::Impl {
     if (mesh.id != kNone) return;
     const scene::Geometry& g = scene.geometries[geometry];
     const double extent = std::max({g.bounds.extent().x, g.bounds.extent().y, g.bounds.extent().z, 1e-30f});
-    // A power of two, so that dequantised positions are exact in float for most scenes; wide enough for 2^29 steps.
+    // A power of two, so that dequantised positions are exact in float for most scenes; wide enough for 2^29
+    // steps.
     const double wish = std::max(settings.position_step_m / scales[geometry], extent / (1 << 29));
     mesh.wire.step = std::exp2(std::floor(std::log2(wish)));
     mesh.wire.offset = {g.bounds.min.x, g.bounds.min.y, g.bounds.min.z};
@@ -177,7 +180,8 @@ struct MetaBuilder::Impl {
     }
   }
 
-  // Colours that moved since they were sent. Runs after add_changed, so that changed patches are already up to date.
+  // Colours that moved since they were sent. Runs after add_changed, so that changed patches are already up
+  // to date.
   void add_recolored(const Shown& shown, gc::MetaFrame& out) {
     size_t color = 0;
     for (const atlas::Placement& placement : shown.placements) {
@@ -198,7 +202,8 @@ struct MetaBuilder::Impl {
       sent_transforms[i] = now;
       out.moved.push_back({object_ids[i], now});
     }
-    std::sort(out.moved.begin(), out.moved.end(), [](const auto& a, const auto& b) { return a.object < b.object; });
+    std::sort(out.moved.begin(), out.moved.end(),
+              [](const auto& a, const auto& b) { return a.object < b.object; });
   }
 };
 
@@ -217,7 +222,8 @@ gc::MetaFrame MetaBuilder::build(FrameNumber frame, const atlas::LayoutDelta& de
   impl_->add_moved(transforms, out);
   impl_->add_changed(delta, shown, transforms, out);
   impl_->add_recolored(shown, out);
-  std::sort(out.placements.begin(), out.placements.end(), [](const auto& a, const auto& b) { return a.patch < b.patch; });
+  std::sort(out.placements.begin(), out.placements.end(),
+            [](const auto& a, const auto& b) { return a.patch < b.patch; });
   return out;
 }
 

@@ -1,5 +1,5 @@
-// Vertices of a geometry that share a position (seams of normals or texture coordinates) under one number: the client
-// draws positions only.
+// Vertices of a geometry that share a position (seams of normals or texture coordinates) under one number:
+// the client draws positions only.
 #pragma once
 
 #include <algorithm>

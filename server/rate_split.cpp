@@ -9,6 +9,8 @@ double RateSplit::atlas_bits(double meta_bits, bool key_frame) const {
   return std::max(allowance - meta_bits, atlas_floor * frame_bits());
 }
 
-bool RateSplit::may_render(DurationNs backlog_ns) const { return to_seconds(backlog_ns) * frames_per_second <= 1.0; }
+bool RateSplit::may_render(DurationNs backlog_ns) const {
+  return to_seconds(backlog_ns) * frames_per_second <= 1.0;
+}
 
 }  // namespace tessera::server

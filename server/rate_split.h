@@ -14,8 +14,9 @@ struct RateSplit {
   double frame_bits() const { return bitrate_bps / frames_per_second; }
   // Bits for the atlas beside `meta_bits` of geometry.
   double atlas_bits(double meta_bits, bool key_frame) const;
-  // False while the network still holds more than one frame's worth of bytes: then the frame is skipped before it is
-  // rendered, so that latency does not build up. `backlog_ns` = time until the sender's queue has drained.
+  // False while the network still holds more than one frame's worth of bytes: then the frame is skipped
+  // before it is rendered, so that latency does not build up. `backlog_ns` = time until the sender's queue
+  // has drained.
   bool may_render(DurationNs backlog_ns) const;
 };
 

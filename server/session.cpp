@@ -65,13 +65,15 @@ Status Session::Impl::set_up() {
   gpu::Device& device = scene->device();
   plan = make_frame_plan(scene->scene().features);
   TESSERA_ASSIGN_OR_RETURN(instant, scene::SceneInstant::create(device, scene->gpu_scene()));
-  TESSERA_ASSIGN_OR_RETURN(visibility, pvs::Visibility::create(device, scene->gpu_scene(), settings.visibility));
+  TESSERA_ASSIGN_OR_RETURN(visibility,
+                           pvs::Visibility::create(device, scene->gpu_scene(), settings.visibility));
   TESSERA_ASSIGN_OR_RETURN(layout, atlas::blocks::Layout::create(scene->scene(), settings.layout));
-  const shading::GatherSettings gather_settings{settings.layout.width, settings.layout.height, settings.gather_path};
-  TESSERA_ASSIGN_OR_RETURN(gather,
-                           shading::Gather::create(device, scene->gpu_scene(), scene->lighting(), gather_settings));
-  TESSERA_ASSIGN_OR_RETURN(converter,
-                           codec::YuvConverter::create(device, settings.layout.width, settings.layout.height));
+  const shading::GatherSettings gather_settings{settings.layout.width, settings.layout.height,
+                                                settings.gather_path};
+  TESSERA_ASSIGN_OR_RETURN(
+      gather, shading::Gather::create(device, scene->gpu_scene(), scene->lighting(), gather_settings));
+  TESSERA_ASSIGN_OR_RETURN(
+      converter, codec::YuvConverter::create(device, settings.layout.width, settings.layout.height));
   const codec::VideoSettings video{.width = settings.layout.width,
                                    .height = settings.layout.height,
                                    .frames_per_second = settings.rate.frames_per_second,
@@ -90,7 +92,8 @@ Status Session::Impl::find_visible(const FrameInput& input, FrameStats& stats) {
   views = pvs::predict_views(input.poses, newest.time_ns, settings.client_view, prediction);
   view_times.clear();
   for (size_t i = 0; i < views.size(); ++i) {
-    view_times.push_back(newest.time_ns + std::min<DurationNs>(static_cast<int64_t>(i) * prediction.step_ns, horizon_ns));
+    view_times.push_back(newest.time_ns +
+                         std::min<DurationNs>(static_cast<int64_t>(i) * prediction.step_ns, horizon_ns));
   }
 
   instant->set(input.scene_time_ns, newest.pose.position);
@@ -124,14 +127,16 @@ Status Session::Impl::encode(const FrameInput& input, const atlas::LayoutDelta& 
 
   const bool key_frame = std::exchange(first, false) || input.key_frame;
   const double budget = settings.rate.atlas_bits(8.0 * static_cast<double>(frame.meta.size()), key_frame);
-  TESSERA_ASSIGN_OR_RETURN(frame.atlas, encoder->encode(frame.number, converter->result(), budget, key_frame));
+  TESSERA_ASSIGN_OR_RETURN(frame.atlas,
+                           encoder->encode(frame.number, converter->result(), budget, key_frame));
   return absl::OkStatus();
 }
 
 Session::Session(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Session::~Session() = default;
 
-StatusOr<std::unique_ptr<Session>> Session::create(std::shared_ptr<SharedScene> scene, const SessionSettings& settings) {
+StatusOr<std::unique_ptr<Session>> Session::create(std::shared_ptr<SharedScene> scene,
+                                                   const SessionSettings& settings) {
   auto impl = std::make_unique<Impl>();
   impl->settings = settings;
   impl->scene = std::move(scene);
@@ -165,24 +170,45 @@ StatusOr<Frame> Session::render(const FrameInput& input) {
   times.encode_ms = watch.lap_ms();
   const atlas::blocks::LayoutStats& layout = frame.stats.layout;
   spdlog::debug(
-      "frame {}: {} views, {} patches seen, {} blocks + {} colours ({} for want of memory), bias {:.2f}, {:.0f} % of the "
-      "atlas used, {} moved, atlas {} B, meta {} B; ms: visibility {:.0f}, layout {:.1f}, shading {:.0f}, encode {:.0f}",
+      "frame {}: {} views, {} patches seen, {} blocks + {} colours ({} for want of memory), bias {:.2f}, "
+      "{:.0f} % of the "
+      "atlas used, {} moved, atlas {} B, meta {} B; ms: visibility {:.0f}, layout {:.1f}, shading {:.0f}, "
+      "encode {:.0f}",
       frame.number, frame.stats.predicted_views, frame.stats.visible_patches, layout.blocks, layout.colors,
       layout.colors_out_of_memory, layout.bias,
-      100.0 * static_cast<double>(layout.used_texels) / (impl_->settings.layout.width * impl_->settings.layout.height),
-      layout.changed, frame.atlas.bytes.size(), frame.meta.size(), times.visibility_ms, times.layout_ms, times.shading_ms,
-      times.encode_ms);
+      100.0 * static_cast<double>(layout.used_texels) /
+          (impl_->settings.layout.width * impl_->settings.layout.height),
+      layout.changed, frame.atlas.bytes.size(), frame.meta.size(), times.visibility_ms, times.layout_ms,
+      times.shading_ms, times.encode_ms);
   return frame;
 }
 
-const FramePlan& Session::plan() const { return impl_->plan; }
-const std::string& Session::encoder() const { return impl_->encoder->choice(); }
-std::span<const View> Session::views() const { return impl_->views; }
-std::span<const TimeNs> Session::view_times() const { return impl_->view_times; }
-DurationNs Session::horizon_ns() const { return impl_->horizon_ns; }
-const scene::VisiblePatches& Session::seen() const { return impl_->seen; }
-std::span<const atlas::Placement> Session::placements() const { return impl_->layout->placements(); }
-const gpu::Image& Session::atlas_image() const { return impl_->gather->image(); }
-YuvView Session::yuv() const { return impl_->converter->result(); }
+const FramePlan& Session::plan() const {
+  return impl_->plan;
+}
+const std::string& Session::encoder() const {
+  return impl_->encoder->choice();
+}
+std::span<const View> Session::views() const {
+  return impl_->views;
+}
+std::span<const TimeNs> Session::view_times() const {
+  return impl_->view_times;
+}
+DurationNs Session::horizon_ns() const {
+  return impl_->horizon_ns;
+}
+const scene::VisiblePatches& Session::seen() const {
+  return impl_->seen;
+}
+std::span<const atlas::Placement> Session::placements() const {
+  return impl_->layout->placements();
+}
+const gpu::Image& Session::atlas_image() const {
+  return impl_->gather->image();
+}
+YuvView Session::yuv() const {
+  return impl_->converter->result();
+}
 
 }  // namespace tessera::server

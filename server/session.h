@@ -1,5 +1,6 @@
-// One client's frames: predict, find the visible set, place it, shade it, and encode both streams. Owns everything that is
-// per session; shares the scene. Time comes in from outside, so the same code runs over sockets and in virtual time.
+// One client's frames: predict, find the visible set, place it, shade it, and encode both streams. Owns
+// everything that is per session; shares the scene. Time comes in from outside, so the same code runs over
+// sockets and in virtual time.
 #pragma once
 
 #include <memory>
@@ -67,7 +68,8 @@ struct Frame {
 // Not thread-safe; uses the scene's device from the calling thread.
 class Session {
  public:
-  static StatusOr<std::unique_ptr<Session>> create(std::shared_ptr<SharedScene> scene, const SessionSettings& settings);
+  static StatusOr<std::unique_ptr<Session>> create(std::shared_ptr<SharedScene> scene,
+                                                   const SessionSettings& settings);
   ~Session();
 
   // Blocks until the frame is encoded. The first frame is a key frame.
@@ -80,7 +82,7 @@ class Session {
   std::span<const View> views() const;         // predicted
   std::span<const TimeNs> view_times() const;  // for when, on the clock of the poses
   DurationNs horizon_ns() const;               // how far ahead they reach
-  const scene::VisiblePatches& seen() const;              // in those views, without the patches that merely stay
+  const scene::VisiblePatches& seen() const;   // in those views, without the patches that merely stay
   std::span<const atlas::Placement> placements() const;
   const gpu::Image& atlas_image() const;
   YuvView yuv() const;  // before coding

@@ -137,7 +137,8 @@ Status Gather::Impl::upload(const GatherWork& work) {
   return absl::OkStatus();
 }
 
-void Gather::Impl::record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, PassPush push, const GatherWork& work) {
+void Gather::Impl::record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, PassPush push,
+                                  const GatherWork& work) {
   for (const ComputeBatch& batch : work.compute_batches) {
     commands.bind(compute, {&scene.group(), &instant.group(), &lighting.group(), &groups.of(batch.material)});
     push.first_chunk = batch.first_chunk;

@@ -35,10 +35,10 @@ class Gather {
                                                   const Lighting& lighting, const GatherSettings& settings);
   ~Gather();
 
-  // Shades all `placements` as seen by `viewer`: from its eye, with textures filtered for its pixels or for the texels,
-  // whichever are wider. Records into `commands`, as the interval "gather" (so
-  // not within another interval) and with a barrier at its end; the same Gather must not be recorded again
-  // before that work is done. Masked patches also get their coverage half.
+  // Shades all `placements` as seen by `viewer`: from its eye, with textures filtered for its pixels or for
+  // the texels, whichever are wider. Records into `commands`, as the interval "gather" (so not within another
+  // interval) and with a barrier at its end; the same Gather must not be recorded again before that work is
+  // done. Masked patches also get their coverage half.
   Status record(gpu::Commands& commands, const scene::SceneInstant& instant, const View& viewer,
                 std::span<const atlas::Placement> placements);
   // After that work is done: sRGB colours of the placements of kind color, in the order of `placements` of

@@ -18,8 +18,9 @@ struct LayoutSettings {
   LevelSettings levels;
 };
 
-// Settings for an atlas of this size: the largest superblocks, up to 256 texels a side, of which there are at least 64.
-// Each block width in use holds a superblock of its own, so fewer would starve patches long before the atlas is full.
+// Settings for an atlas of this size: the largest superblocks, up to 256 texels a side, of which there are at
+// least 64. Each block width in use holds a superblock of its own, so fewer would starve patches long before
+// the atlas is full.
 LayoutSettings settings_for(uint32_t width, uint32_t height);
 
 struct LayoutStats {

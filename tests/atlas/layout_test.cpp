@@ -340,8 +340,12 @@ TEST_F(LayoutTest, HopelessAtlasSettles) {
 }
 
 TEST(SettingsFor, KeepsAtLeast64SuperblocksThatTileTheAtlas) {
-  for (const auto& [width, height, log] : {std::tuple{512u, 256u, 5}, {1024u, 1024u, 7}, {2048u, 1024u, 7},
-                                           {4096u, 2048u, 8}, {8192u, 8192u, 8}, {64u, 64u, 3}}) {
+  for (const auto& [width, height, log] : {std::tuple{512u, 256u, 5},
+                                           {1024u, 1024u, 7},
+                                           {2048u, 1024u, 7},
+                                           {4096u, 2048u, 8},
+                                           {8192u, 8192u, 8},
+                                           {64u, 64u, 3}}) {
     const LayoutSettings settings = settings_for(width, height);
     EXPECT_EQ(settings.superblock_log, log) << width << "x" << height;
     EXPECT_EQ(settings.levels.max_log, log);

@@ -26,17 +26,21 @@ TEST(Unite, SortedWithTheLargestFootprint) {
 TEST(CoverageMeter, WeighsWhatWasSeenWithinTheHorizonByArea) {
   CoverageMeter meter;
   meter.add_seen(0, set({{1, 10}}));
-  meter.add_frame({.from_ns = 10, .to_ns = 20, .placed = set({{1, 0}, {2, 0}}), .predicted = set({{1, 10}, {5, 4}}),
-                   .without_prediction = set({{1, 0}}), .with_true_path = set({{1, 10}, {2, 30}})});
+  meter.add_frame({.from_ns = 10,
+                   .to_ns = 20,
+                   .placed = set({{1, 0}, {2, 0}}),
+                   .predicted = set({{1, 10}, {5, 4}}),
+                   .without_prediction = set({{1, 0}}),
+                   .with_true_path = set({{1, 10}, {2, 30}})});
   meter.add_seen(15, set({{1, 10}, {2, 30}}));
   EXPECT_EQ(meter.result().frames, 0u) << "the horizon is not over";
   meter.add_seen(20, set({{1, 10}, {3, 60}}));
   meter.add_seen(30, set({{9, 1000}}));
   const auto result = meter.result();
   EXPECT_EQ(result.frames, 1u);
-  EXPECT_DOUBLE_EQ(result.coverage, 0.4);                      // 1 and 2 of 1, 2, 3
-  EXPECT_DOUBLE_EQ(result.coverage_without_prediction, 0.1);   // 1 of 1, 2, 3
-  EXPECT_DOUBLE_EQ(result.overestimation, 4.0 / 40);           // 5 beside 1 and 2
+  EXPECT_DOUBLE_EQ(result.coverage, 0.4);                     // 1 and 2 of 1, 2, 3
+  EXPECT_DOUBLE_EQ(result.coverage_without_prediction, 0.1);  // 1 of 1, 2, 3
+  EXPECT_DOUBLE_EQ(result.overestimation, 4.0 / 40);          // 5 beside 1 and 2
 }
 
 TEST(CoverageMeter, IgnoresFramesOfTheTimeBeforeTheRun) {

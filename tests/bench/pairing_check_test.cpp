@@ -22,9 +22,13 @@ scene::Scene make_scene() {
 
 struct Fixture : testing::Test {
   scene::Scene scene = make_scene();
-  std::vector<atlas::Placement> placements = {
-      {.patch = 0, .kind = atlas::PlacementKind::color},
-      {.patch = 1, .kind = atlas::PlacementKind::block, .level = {4, 3}, .x = 32, .y = 64, .transposed = true}};
+  std::vector<atlas::Placement> placements = {{.patch = 0, .kind = atlas::PlacementKind::color},
+                                              {.patch = 1,
+                                               .kind = atlas::PlacementKind::block,
+                                               .level = {4, 3},
+                                               .x = 32,
+                                               .y = 64,
+                                               .transposed = true}};
   client::SceneState state = [] {
     client::SceneState s;
     client::TriangleFields color;
@@ -44,7 +48,9 @@ struct Fixture : testing::Test {
   }();
 };
 
-TEST_F(Fixture, EqualSetsMatch) { EXPECT_TRUE(matches(state, placements, scene)); }
+TEST_F(Fixture, EqualSetsMatch) {
+  EXPECT_TRUE(matches(state, placements, scene));
+}
 
 TEST_F(Fixture, EveryDifferenceIsSeen) {
   for (int what = 0; what < 6; ++what) {

@@ -114,8 +114,8 @@ TEST(Settings, WrongValuesAreRefused) {
        {"--fps=0",          "--fps=abc",       "--size=960",        "--size=961x540",     "--size=0x540",
         "--size=960x540x3", "--size=-960x540", "--atlas=2044x1024", "--atlas=99999x1024", "--loss=0.9",
         "--loss=-1",        "--fov-y=180",     "--codec=mp3",       "--layout=none",      "--pvs=magic",
-        "--truth=2x",       "--baselines=atw", "--score-every=0",    "--seconds=0",
-        "--clock=real",     "--unknown=1",     "--split=maybe",     "--server-ms=-1",     "--seed=-1"}) {
+        "--truth=2x",       "--baselines=atw", "--score-every=0",   "--seconds=0",        "--clock=real",
+        "--unknown=1",      "--split=maybe",   "--server-ms=-1",    "--seed=-1"}) {
     EXPECT_THROW(parse({flag}), CLI::ParseError) << flag;
   }
 }

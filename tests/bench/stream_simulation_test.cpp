@@ -5,7 +5,8 @@
 namespace tessera::bench {
 namespace {
 
-// Answers each frame with two packets of fixed size that carry the frame number, and counts what it was asked.
+// Answers each frame with two packets of fixed size that carry the frame number, and counts what it was
+// asked.
 class FakeStreamer final : public Streamer {
  public:
   explicit FakeStreamer(size_t atlas_bytes) : atlas_bytes_(atlas_bytes) {}
@@ -100,7 +101,8 @@ TEST(StreamSimulation, ServerUsesTheNewestPoseThatArrived) {
   const FrameTimeline& last = simulation.shown_frames().back();
   EXPECT_LE(last.render_start - last.pose_received, from_ms(17)) << "poses come 60 times a second";
   EXPECT_EQ(streamer.round_trip % 1, 0);
-  EXPECT_NEAR(to_ms(streamer.round_trip), to_ms(last.shown - last.pose_sent), 40) << "the client's measurement";
+  EXPECT_NEAR(to_ms(streamer.round_trip), to_ms(last.shown - last.pose_sent), 40)
+      << "the client's measurement";
 }
 
 TEST(StreamSimulation, SkipsServerPeriodsWhileTheNetworkIsBehind) {

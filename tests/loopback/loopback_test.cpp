@@ -1,4 +1,5 @@
-// The whole chain on a small procedural scene. What it checks holds for every scene; figures belong to `tessera-bench`.
+// The whole chain on a small procedural scene. What it checks holds for every scene; figures belong to
+// `tessera-bench`.
 #include "bench/loopback.h"
 
 #include <gtest/gtest.h>

@@ -7,10 +7,12 @@ namespace {
 
 TEST(FramePlan, EmptySceneNeedsNoOptionalPass) {
   const FramePlan plan = make_frame_plan({});
-  for (const char* pass : {"object_transforms", "sun_shadow", "spot_shadows", "id_masked", "coverage", "normal_maps", "blend"}) {
+  for (const char* pass :
+       {"object_transforms", "sun_shadow", "spot_shadows", "id_masked", "coverage", "normal_maps", "blend"}) {
     EXPECT_FALSE(plan.includes(pass)) << pass;
   }
-  for (const char* pass : {"culling", "id_opaque", "layout", "gather", "encode"}) EXPECT_TRUE(plan.includes(pass)) << pass;
+  for (const char* pass : {"culling", "id_opaque", "layout", "gather", "encode"})
+    EXPECT_TRUE(plan.includes(pass)) << pass;
 }
 
 TEST(FramePlan, EachFeatureBringsItsPass) {

@@ -38,7 +38,9 @@ scene::Scene make_scene() {
 atlas::Placement block(scene::PatchId patch, uint16_t x) {
   return {.patch = patch, .kind = atlas::PlacementKind::block, .level = {3, 2}, .x = x, .y = 8};
 }
-atlas::Placement color(scene::PatchId patch) { return {.patch = patch, .kind = atlas::PlacementKind::color}; }
+atlas::Placement color(scene::PatchId patch) {
+  return {.patch = patch, .kind = atlas::PlacementKind::color};
+}
 
 struct Fixture : testing::Test {
   scene::Scene scene = make_scene();
@@ -50,8 +52,8 @@ struct Fixture : testing::Test {
     return t;
   }();
 
-  gc::MetaFrame build(FrameNumber frame, const atlas::LayoutDelta& delta, const std::vector<atlas::Placement>& all,
-                      const std::vector<uint32_t>& colors = {}) {
+  gc::MetaFrame build(FrameNumber frame, const atlas::LayoutDelta& delta,
+                      const std::vector<atlas::Placement>& all, const std::vector<uint32_t>& colors = {}) {
     return builder.build(frame, delta, {all, colors}, transforms);
   }
 };
@@ -70,7 +72,8 @@ TEST_F(Fixture, SendsThingsOnceAndSharesVertices) {
 
   const auto second = build(8, {.changed = {block(1, 32)}}, {block(0, 0), block(1, 32)});
   EXPECT_FALSE(second.full_state);
-  EXPECT_TRUE(second.vertices.empty() && second.patches.empty() && second.objects.empty() && second.meshes.empty());
+  EXPECT_TRUE(second.vertices.empty() && second.patches.empty() && second.objects.empty() &&
+              second.meshes.empty());
   ASSERT_EQ(second.placements.size(), 1u);
   EXPECT_EQ(second.placements[0].x, 32);
 }

@@ -19,7 +19,9 @@ TEST(RateSplit, AtlasKeepsItsFloor) {
   }
 }
 
-TEST(RateSplit, KeyFrameMayTakeFourBudgets) { EXPECT_DOUBLE_EQ(kSplit.atlas_bits(0, true), 4 * 600e3); }
+TEST(RateSplit, KeyFrameMayTakeFourBudgets) {
+  EXPECT_DOUBLE_EQ(kSplit.atlas_bits(0, true), 4 * 600e3);
+}
 
 TEST(RateSplit, SkipsAFrameWhileTheNetworkHoldsMoreThanOne) {
   EXPECT_TRUE(kSplit.may_render(0));

@@ -147,7 +147,8 @@ Cost cost_of(std::shared_ptr<scene::Scene> s) {
   const std::vector<TimedPose> poses = {{0, Pose{}}};
   must(session->render(input(0, poses)));
   const Counters after;
-  return {after.dispatches - before.dispatches, after.draws - before.draws, bytes, shared->lighting().shadow_maps()};
+  return {after.dispatches - before.dispatches, after.draws - before.draws, bytes,
+          shared->lighting().shadow_maps()};
 }
 
 TEST_F(SessionTest, OmittedPassesCostNothing) {
