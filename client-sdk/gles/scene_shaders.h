@@ -14,7 +14,7 @@ uniform highp sampler2D vertices;
 uniform highp sampler2D transforms;
 uniform mat4 clip_from_relative;
 
-centroid out vec2 texel;
+out vec2 texel;
 flat out vec4 texel_bounds;     // centres of the first and last texel of the block's colour part
 flat out vec2 coverage_offset;  // from a texel to its coverage
 flat out vec4 single_color;     // a = 1: no block
@@ -77,7 +77,7 @@ uniform vec2 atlas_size;
 uniform bool masked;
 uniform bool multisampled;
 
-centroid in vec2 texel;
+in vec2 texel;
 flat in vec4 texel_bounds;
 flat in vec2 coverage_offset;
 flat in vec4 single_color;
@@ -86,7 +86,8 @@ out vec4 color;
 vec3 atlas_at(vec2 position) { return textureLod(atlas, position / atlas_size, 0.0).rgb; }
 
 void main() {
-  // Interpolation may leave the block by rounding, even at the centroid.
+  // At a pixel whose centre lies outside the triangle interpolation may leave the block. Not `centroid`: thin triangles
+  // share most of their pixels, and each would be sampled elsewhere than where the pixel shows it.
   vec2 inside = clamp(texel, texel_bounds.xy, texel_bounds.zw);
   color = vec4(single_color.a > 0.5 ? single_color.rgb : atlas_at(inside), 1.0);
   if (!masked) return;

@@ -77,6 +77,36 @@ TEST(Geometry, MirroredObjectsShowTheMirroredPicture) {
   }
 }
 
+// A screen of strips about a pixel thin, at every slant: nearly every pixel is shared. Each strip shows its block's
+// ramp along it, so that a pixel's red tells where it was sampled.
+TEST(Geometry, PixelsSharedByThinPatchesAreSampledAtTheirCentres) {
+  constexpr float kHalfLength = 1.5f, kRise = 0.034f, kTwoPi = 6.2831853f;
+  constexpr int kTurns = 12;
+  auto display = make_display(kSide);
+  for (int turn = 0; turn < kTurns; ++turn) {
+    const float angle = kTwoPi * (static_cast<float>(turn) + 0.3f) / kTurns;
+    const vec2 along(std::cos(angle), std::sin(angle)), across(-along.y, along.x);
+    const auto at = [&](float a, float b) { return vec3(a * along + b * across, -1); };
+    SceneBuilder scene;
+    const uint32_t object = scene.object();
+    for (float b = -kHalfLength; b < kHalfLength; b += kRise) {
+      scene.block(scene.patch(object, {at(-kHalfLength, b), at(kHalfLength, b), at(-kHalfLength, b + kRise),
+                                       at(kHalfLength, b + kRise)}),
+                  0, 0, 5, 1);
+    }
+    const Image8 image = picture_of(*display, scene.state(), ramp_atlas(), square_view(kSide));
+    for (uint32_t y = 2; y < kSide - 2; ++y) {
+      for (uint32_t x = 2; x < kSide - 2; ++x) {
+        const vec2 center = (vec2(x, y) + 0.5f) * (2.0f / kSide) - 1.0f;
+        const float position = glm::dot(vec2(center.x, -center.y), along);
+        // 2.6 levels a pixel; 0.5 by rounding.
+        ASSERT_NEAR(pixel(image, x, y).r, 248 * (position + kHalfLength) / (2 * kHalfLength), 0.75)
+            << x << "," << y << " turn " << turn;
+      }
+    }
+  }
+}
+
 TEST(Geometry, NearerSurfacesHideFartherOnesInAnyOrder) {
   auto display = make_display(kSide);
   // Distances and gaps that a fixed-point depth buffer would not tell apart.
