@@ -6,7 +6,7 @@ namespace tessera::server {
 
 double RateSplit::atlas_bits(double meta_bits, bool key_frame) const {
   const double allowance = frame_bits() * (key_frame ? key_frame_budgets : 1.0);
-  return std::max(allowance - meta_bits, atlas_floor * frame_bits());
+  return std::max(allowance - meta_bits, atlas_floor * allowance);
 }
 
 bool RateSplit::may_render(DurationNs backlog_ns) const {
