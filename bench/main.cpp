@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/log.h"
+#include "bench/culling.h"
 #include "bench/file_io.h"
 #include "bench/loopback.h"
 #include "bench/report.h"
@@ -19,7 +20,7 @@ enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
 constexpr char kFooter[] =
     R"(Configuration: every option is also an environment variable (--delay-ms = TESSERA_BENCH_DELAY_MS) and a key
-of the --config file, under [loopback]. Flags win over the file, the file over the environment.
+of the --config file, under [loopback] or [culling]. Flags win over the file, the file over the environment.
 
 Exit codes: 0 done, 1 the run failed, 2 wrong usage.)";
 
@@ -35,8 +36,10 @@ int report_failure(const Status& status) {
   return kFailed;
 }
 
-std::string command_line(const bench::LoopbackSettings& settings) {
-  std::string command = "tessera-bench loopback";
+constexpr char kCullingFooter[] = R"(Example:
+  tessera-bench culling --scene viking_village.glb --path viking_village_1.csv --seconds 1)";
+
+std::string command_line(std::string command, const bench::LoopbackSettings& settings) {
   for (const std::string& flag : bench::to_flags(settings)) command += " " + flag;
   return command;
 }
@@ -72,9 +75,24 @@ int run_loopback(const bench::LoopbackSettings& settings) {
   if (!result.ok()) return report_failure(result.status());
   if (settings.estimate_only) return kOk;
   result->settings = settings;
-  result->command = command_line(settings);
+  result->command = command_line("tessera-bench loopback", settings);
   print_summary(*result);
   const Status written = write_outputs(*result);
+  return written.ok() ? kOk : report_failure(written);
+}
+
+int run_culling(const bench::LoopbackSettings& settings) {
+  const SteadyClock clock;
+  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
+  StatusOr<bench::CullingResult> result = bench::run_culling(settings, progress);
+  if (!result.ok()) return report_failure(result.status());
+  result->command = command_line("tessera-bench culling", settings);
+  const bench::Percentiles ratio = result->ratio();
+  std::cout << absl::StrFormat("id buffers, culled / all drawn: median %.3f, p95 %.3f, first frame %.3f\n",
+                               ratio.p50, ratio.p95, result->frames.front().ratio());
+  std::cout << "visible sets: " << result->differing_patches() << " patches differ in all frames together" << std::endl;
+  if (settings.json.empty()) return kOk;
+  const Status written = bench::write_file(settings.json, bench::to_json(*result).dump(1) + "\n");
   return written.ok() ? kOk : report_failure(written);
 }
 
@@ -106,6 +124,12 @@ int main(int argc, char** argv) {
   loopback->footer(kLoopbackFooter);
   loopback->fallthrough();
 
+  CLI::App* culling = app.add_subcommand("culling", "id-buffer time with culling against drawing everything");
+  bench::LoopbackSettings culling_settings;
+  bench::add_options(*culling, culling_settings, bench::culling_options());
+  culling->footer(kCullingFooter);
+  culling->fallthrough();
+
   CLI::App* report = app.add_subcommand("report", "one page from all runs in a folder");
   std::string folder;
   report->add_option("folder", folder, "where `loopback --report` left its runs")
@@ -119,5 +143,6 @@ int main(int argc, char** argv) {
     return app.exit(e) == 0 ? kOk : kUsage;
   }
   init_logging(log_level);
-  return loopback->parsed() ? run_loopback(settings) : run_report(folder);
+  if (loopback->parsed()) return run_loopback(settings);
+  return culling->parsed() ? run_culling(culling_settings) : run_report(folder);
 }

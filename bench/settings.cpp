@@ -151,7 +151,7 @@ CLI::Validator sizes(uint32_t max, uint32_t width_multiple, uint32_t height_mult
 
 void add_checks(CLI::App& app) {
   const auto check = [&app](const char* name, const CLI::Validator& validator) {
-    app.get_option(name)->check(validator);
+    if (CLI::Option* option = app.get_option_no_throw(name)) option->check(validator);
   };
   check("--start", CLI::Range(0.0, 1e6));
   check("--seconds", CLI::Range(0.01, 36000.0));
@@ -199,8 +199,11 @@ bool LoopbackSettings::wants_baseline(std::string_view name) const {
          std::find(baselines.begin(), baselines.end(), name) != baselines.end();
 }
 
-void add_options(CLI::App& app, LoopbackSettings& settings) {
-  for_each_option(settings, AddOption{app});
+void add_options(CLI::App& app, LoopbackSettings& settings, std::span<const std::string> names) {
+  const AddOption add{app};
+  for_each_option(settings, [&](const char* group, const char* name, auto& field, const char* meaning) {
+    if (names.empty() || std::ranges::find(names, name) != names.end()) add(group, name, field, meaning);
+  });
   add_checks(app);
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <iosfwd>
 #include <nlohmann/json_fwd.hpp>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -68,9 +69,9 @@ struct LoopbackSettings {
   bool wants_baseline(std::string_view name) const;
 };
 
-// Adds every option to `app`: flags, environment variables TESSERA_BENCH_<OPTION>, checks, groups. `settings`
-// must outlive the parse, and gives the defaults.
-void add_options(CLI::App& app, LoopbackSettings& settings);
+// Adds the options `names` (all if empty) to `app`: flags, environment variables TESSERA_BENCH_<OPTION>, checks, groups.
+// `settings` must outlive the parse, and gives the defaults.
+void add_options(CLI::App& app, LoopbackSettings& settings, std::span<const std::string> names = {});
 
 // Option name → value, as JSON; what add_options() would read to get the same settings.
 nlohmann::json to_json(const LoopbackSettings& settings);
