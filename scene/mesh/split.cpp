@@ -174,13 +174,14 @@ uint64_t count_after_split(const SourceMesh& mesh, double max_edge_m, uint64_t s
   return count;
 }
 
-double choose_max_edge(std::span<const SourceMesh> meshes, std::span<const uint64_t> instances) {
+double choose_max_edge(std::span<const SourceMesh> meshes, std::span<const uint64_t> instances,
+                       uint64_t max_growth) {
   uint64_t total = 0, unique = 0;
   for (size_t i = 0; i < meshes.size(); ++i) {
     total += instances[i] * meshes[i].triangle_count();
     unique += meshes[i].triangle_count();
   }
-  const uint64_t budget = std::max<uint64_t>(total * 15 / 100, 100'000);
+  const uint64_t budget = std::min(max_growth, std::max<uint64_t>(total * 15 / 100, 100'000));
   const auto fits = [&](double max_edge_m) {
     uint64_t growth = 0;
     for (size_t i = 0; i < meshes.size(); ++i) {
