@@ -1,4 +1,5 @@
-// Logging through spdlog. Programs call init_logging() once; libraries just log.
+// Logging through spdlog. Programs call init_logging() once, before they start threads; libraries just log,
+// on any thread.
 #pragma once
 
 #include <spdlog/spdlog.h>

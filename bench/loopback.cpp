@@ -95,7 +95,8 @@ class Loopback {
 };
 
 Status Loopback::set_up() {
-  TESSERA_ASSIGN_OR_RETURN(device_, gpu::Device::create({.select = settings_.device}));
+  TESSERA_ASSIGN_OR_RETURN(
+      device_, gpu::Device::create({.select = settings_.device, .validation = settings_.validation}));
   result_.settings = settings_;
   result_.device = {device_->info().name, device_->info().driver, device_->info().software};
   TESSERA_ASSIGN_OR_RETURN(scene_, scene::load_scene(settings_.scene));

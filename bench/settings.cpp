@@ -29,6 +29,7 @@ void for_each_option(Settings& s, Visitor&& visit) {
   visit("Server", "bitrate-mbps", s.bitrate_mbps, "atlas and meta together");
   visit("Server", "pvs", s.pvs, "prediction of the potentially visible set");
   visit("Server", "device", s.device, "Vulkan device: cpu, an index, or part of its name");
+  visit("Server", "validation", s.validation, "load the Vulkan validation layer, which logs misuse");
   visit("Network", "delay-ms", s.delay_ms, "one way");
   visit("Network", "jitter-ms", s.jitter_ms, "uniform, plus or minus");
   visit("Network", "loss", s.loss, "share of datagrams lost (they are sent again)");

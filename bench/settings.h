@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/status.h"
+#include "gpu/device.h"
 
 namespace CLI {
 class App;
@@ -48,6 +49,7 @@ struct LoopbackSettings {
   double bitrate_mbps = 20;  // atlas and meta together
   Prediction pvs = Prediction::linear;
   std::string device = "cpu";
+  bool validation = gpu::DeviceOptions{}.validation;
   // Network
   double delay_ms = 50;  // one way
   double jitter_ms = 0;  // uniform ±

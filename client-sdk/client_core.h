@@ -29,8 +29,10 @@ struct Pair {
   SceneState state;
 };
 
-// on_* may be called from one receiving thread while take_newest() is called from one drawing thread; they
-// meet in a triple buffer and never wait for each other.
+// Thread-safety: on_* belong to one receiving thread (the network's), take_newest() and the pair that it gave
+// to one drawing thread. The two meet in a triple buffer and never wait for each other. wants_key_frame() and
+// stats() may be called from any thread; each number is up to date by itself, but they need not be of the
+// same moment.
 //
 // Rules (docs/architecture.md): only complete pairs are shown, newest first. Meta frames apply in order and
 // each exactly once. An atlas whose decoding chain is broken is never part of a pair; the core then wants a

@@ -343,10 +343,22 @@ class MeshImporter {
                                                           options_.limits.max_instanced_triangles));
   }
 
+  // An edge length under which no limit is exceeded.
+  double automatic_edge() const {
+    uint64_t unique = 0, instanced = 0;
+    for (size_t i = 0; i < meshes_.size(); ++i) {
+      unique += meshes_[i].triangle_count();
+      instanced += meshes_[i].triangle_count() * instance_counts_[i];
+    }
+    const ImportLimits& limits = options_.limits;
+    const uint64_t room = std::min(limits.max_triangles - std::min(unique, limits.max_triangles),
+                                   limits.max_instanced_triangles - instanced);
+    return choose_max_edge(meshes_, instance_counts_, room);
+  }
+
   Status split() {
     if (options_.max_edge_m < 0) return absl::OkStatus();
-    const double max_edge_m =
-        options_.max_edge_m > 0 ? options_.max_edge_m : choose_max_edge(meshes_, instance_counts_);
+    const double max_edge_m = options_.max_edge_m > 0 ? options_.max_edge_m : automatic_edge();
     uint64_t before = 0, unique = 0, instanced = 0;
     for (size_t i = 0; i < meshes_.size(); ++i) {
       const uint64_t count = count_after_split(meshes_[i], max_edge_m, options_.limits.max_triangles);

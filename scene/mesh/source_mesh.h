@@ -44,8 +44,10 @@ void split_long_edges(SourceMesh& mesh, double max_edge_m);
 // Triangles that split_long_edges() would leave; counting stops above `stop_at`.
 uint64_t count_after_split(const SourceMesh& mesh, double max_edge_m, uint64_t stop_at);
 // The smallest of 0.35, 0.5, 0.7, 1, 1.4, 2 … m that adds at most max(15 %, 100,000) instanced triangles.
-// `instances`: how many instances place each mesh.
-double choose_max_edge(std::span<const SourceMesh> meshes, std::span<const uint64_t> instances);
+// `instances`: how many instances place each mesh. `max_growth`: a bound on what is added, where there is
+// one.
+double choose_max_edge(std::span<const SourceMesh> meshes, std::span<const uint64_t> instances,
+                       uint64_t max_growth = UINT64_MAX);
 
 // Cuts the mesh into meshlets and patches and orders triangles and vertices by them.
 Geometry build_geometry(SourceMesh mesh);

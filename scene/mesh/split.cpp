@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <unordered_map>
 
 #include "scene/mesh/source_mesh.h"
@@ -115,6 +116,22 @@ Vertex middle(const Vertex& a, const Vertex& b) {
   return m;
 }
 
+// A power of two, at least 1 m, below which the longest edge alone would fall into more pieces than
+// `triangles`, each a part of the border of another triangle. Keeps coordinates of 1e30 m from costing a
+// hundred octaves of counting.
+double first_octave(std::span<const SourceMesh> meshes, uint64_t triangles) {
+  double longest2 = 0;
+  for (const SourceMesh& mesh : meshes) {
+    const EdgeRule rule(mesh.scale, 0);
+    const auto position = [&](size_t corner) { return mesh.vertices[mesh.indices[corner]].position; };
+    for (size_t i = 0; i < mesh.indices.size(); ++i)
+      longest2 = std::max(longest2, rule.length2(position(i), position(i - i % 3 + (i + 1) % 3)));
+  }
+  const double shortest_piece = std::sqrt(longest2) / static_cast<double>(triangles);
+  // A quarter, because in a triangle that is flat to the last bit pieces may share a triangle.
+  return std::max(1.0, std::exp2(std::floor(std::log2(shortest_piece / 4))));
+}
+
 }  // namespace
 
 void split_long_edges(SourceMesh& mesh, double max_edge_m) {
@@ -157,10 +174,14 @@ uint64_t count_after_split(const SourceMesh& mesh, double max_edge_m, uint64_t s
   return count;
 }
 
-double choose_max_edge(std::span<const SourceMesh> meshes, std::span<const uint64_t> instances) {
-  uint64_t total = 0;
-  for (size_t i = 0; i < meshes.size(); ++i) total += instances[i] * meshes[i].triangle_count();
-  const uint64_t budget = std::max<uint64_t>(total * 15 / 100, 100'000);
+double choose_max_edge(std::span<const SourceMesh> meshes, std::span<const uint64_t> instances,
+                       uint64_t max_growth) {
+  uint64_t total = 0, unique = 0;
+  for (size_t i = 0; i < meshes.size(); ++i) {
+    total += instances[i] * meshes[i].triangle_count();
+    unique += meshes[i].triangle_count();
+  }
+  const uint64_t budget = std::min(max_growth, std::max<uint64_t>(total * 15 / 100, 100'000));
   const auto fits = [&](double max_edge_m) {
     uint64_t growth = 0;
     for (size_t i = 0; i < meshes.size(); ++i) {
@@ -171,7 +192,7 @@ double choose_max_edge(std::span<const SourceMesh> meshes, std::span<const uint6
     }
     return true;
   };
-  double octave = 1;
+  double octave = first_octave(meshes, unique + budget);
   while (true) {
     for (const double step : {0.35, 0.5}) {
       if (fits(step * octave)) return step * octave;

@@ -39,6 +39,7 @@ LoopbackSettings unusual() {
   s.bitrate_mbps = 7.5;
   s.pvs = Prediction::none;
   s.device = "some gpu";
+  s.validation = !s.validation;
   s.delay_ms = 20;
   s.jitter_ms = 10;
   s.loss = 0.015625;

@@ -186,6 +186,7 @@ TEST(ClientCore, ReceivesAndDrawsOnTwoThreads) {
     }
     EXPECT_TRUE(!newest || *index > *newest);
     EXPECT_FALSE(core->wants_key_frame());
+    EXPECT_LE(core->stats().pairs, kFrames);
     newest = index;
     ++taken;
   }
@@ -193,6 +194,46 @@ TEST(ClientCore, ReceivesAndDrawsOnTwoThreads) {
   EXPECT_FALSE(failed);
   EXPECT_EQ(core->stats().pairs, kFrames);
   EXPECT_EQ(core->stats().pairs_skipped, kFrames - taken);
+}
+
+// Losses and damage on the receiving thread; the drawing thread still sees whole pairs of intact chains only.
+TEST(ClientCore, DrawsOnlyIntactChainsWhileAnotherThreadReceivesDamage) {
+  constexpr uint32_t kGroup = 10, kGroups = 12, kLost = 4;  // a key frame begins each group
+  constexpr uint32_t kFrames = kGroup * kGroups;
+  std::vector<uint32_t> key_frames;
+  for (uint32_t group = 0; group < kGroups; ++group) key_frames.push_back(group * kGroup);
+  const auto stream = make_stream(kFrames, key_frames);
+  auto core = make_core();
+  std::atomic<bool> done{false}, meta_failed{false};
+  std::jthread receiver([&] {
+    for (uint32_t i = 0; i < kFrames; ++i) {
+      if (!core->on_meta(stream[i].meta).ok()) meta_failed = true;
+      const std::span<const uint8_t> unit = stream[i].atlas;
+      if (i % kGroup != kLost) {
+        (void)core->on_atlas(unit);
+      } else if (i / kGroup % 2 == 0) {
+        (void)core->on_atlas(unit.first(unit.size() / 2));
+      }
+    }
+    done = true;
+  });
+  std::optional<uint32_t> newest;
+  while (true) {
+    const bool last_look = done;
+    if (const auto index = take(*core)) {
+      EXPECT_LT(*index % kGroup, kLost) << "drawn though its chain is broken";
+      EXPECT_TRUE(!newest || *index > *newest);
+      newest = index;
+    } else if (last_look) {
+      break;
+    } else {
+      std::this_thread::yield();
+    }
+  }
+  EXPECT_FALSE(meta_failed);
+  EXPECT_TRUE(core->wants_key_frame());
+  EXPECT_EQ(newest, kFrames - kGroup + kLost - 1);
+  EXPECT_EQ(core->stats().pairs, kGroups * kLost);
 }
 
 }  // namespace

@@ -1,10 +1,13 @@
 #include "gpu/device.h"
 
+#include <gtest/gtest-spi.h>
+
 #include "gpu_test.h"
 
 namespace tessera::gpu {
 namespace {
 
+using testing::Each;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -53,16 +56,34 @@ TEST(DeviceLifetime, ResourcesMayOutliveTheirDevice) {
   EXPECT_EQ(buffer.as<uint32_t>()[0], 7u);
 }
 
-TEST(Validation, CountsAFault) {
+// Failures of `body`, which then are none of the running test.
+template <class Body>
+std::vector<std::string> failures_of(Body&& body) {
+  testing::TestPartResultArray results;
+  {
+    const testing::ScopedFakeTestPartResultReporter intercept(
+        testing::ScopedFakeTestPartResultReporter::INTERCEPT_ALL_THREADS, &results);
+    body();
+  }
+  std::vector<std::string> messages;
+  for (int i = 0; i < results.size(); ++i) messages.push_back(results.GetTestPartResult(i).message());
+  return messages;
+}
+
+TEST(Validation, AFaultIsCountedAndFailsTheTest) {
   const auto device = value(Device::create({.select = "cpu", .validation = true}));
   const Image small =
       value(Image::create(*device, {.width = 4, .height = 4, .format = Format::r32_uint}, "small"));
   EXPECT_EQ(device->validation_messages(), 0u);
   const ColorAttachment color{.image = &small};
   Commands never_submitted = device->begin();
-  never_submitted.begin_rendering({.colors = {&color, 1}, .width = 8, .height = 8});
-  never_submitted.end_rendering();
+  const std::vector<std::string> failures = failures_of([&] {
+    never_submitted.begin_rendering({.colors = {&color, 1}, .width = 8, .height = 8});
+    never_submitted.end_rendering();
+  });
   EXPECT_GT(device->validation_messages(), 0u) << "the target is larger than its image";
+  EXPECT_EQ(failures.size(), device->validation_messages());
+  EXPECT_THAT(failures, Each(HasSubstr("vulkan: ")));
 }
 
 using DeviceTest = GpuTest;

@@ -20,6 +20,7 @@ LoopbackSettings small(double seconds) {
   s.bitrate_mbps = 10;
   s.truth_cache = "none";
   s.baselines = {"none"};
+  s.validation = true;
   return s;
 }
 

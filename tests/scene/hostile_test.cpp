@@ -320,6 +320,20 @@ TEST(Hostile, LimitsAreKept) {
   EXPECT_EQ(load(sample_file(), fine_cut).status().code(), kOver);
 }
 
+TEST(Hostile, TheAutomaticSplitStaysWithinTheLimits) {
+  GltfBuilder file = sample_file();
+  file.document["nodes"][0]["scale"] = {100, 100, 100};
+  ImportOptions options;
+  options.limits.max_triangles = 300;
+  options.limits.max_instanced_triangles = 400;
+  const auto scene = load(file, options);
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_GT((*scene)->geometries[0].triangle_count(), 20u);
+  EXPECT_LE((*scene)->geometries[0].triangle_count(), 400u / 3);
+  options.limits.max_triangles = 2;  // what the file has
+  EXPECT_TRUE(load(file, options).ok());
+}
+
 std::string message_of(const std::vector<std::byte>& file) {
   return std::string(load_gltf(file, "test.glb", {}).status().message());
 }

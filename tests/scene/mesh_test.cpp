@@ -152,6 +152,14 @@ TEST(Split, AutomaticEdgeGrowsTheSceneWithinItsBudget) {
   EXPECT_EQ(choose_max_edge(none, std::array<uint64_t, 1>{1}), 0.35);
 }
 
+// Else a file of a few hundred bytes could take minutes: found by fuzzing.
+TEST(Split, AutomaticEdgeOfAHugeSceneIsThatOfASmallOneScaled) {
+  std::vector<SourceMesh> wall = {grid(1, 1, 100, 100)};
+  const double edge = choose_max_edge(wall, std::array<uint64_t, 1>{1});
+  wall[0].scale = dvec3(std::ldexp(1.0, 500));
+  EXPECT_EQ(choose_max_edge(wall, std::array<uint64_t, 1>{1}), std::ldexp(edge, 500));
+}
+
 struct Shares {
   std::array<uint32_t, 4> patches{};
   uint32_t all() const { return patches[1] + patches[2] + patches[3]; }
