@@ -20,8 +20,7 @@ scene::Footprint larger(const scene::Footprint& a, const scene::Footprint& b) {
 }  // namespace
 
 void CoverageMeter::add_frame(Frame frame) {
-  // A frame made before the first display frame looks at a time that nobody scored.
-  if (!seen_.empty() && frame.from_ns >= seen_.front().first) open_.push_back(std::move(frame));
+  if (wants(frame.from_ns)) open_.push_back(std::move(frame));
 }
 
 void CoverageMeter::add_seen(TimeNs now_ns, scene::VisiblePatches seen) {

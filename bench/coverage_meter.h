@@ -27,6 +27,8 @@ class CoverageMeter {
     uint32_t frames = 0;  // whose horizon lay within the run
   };
 
+  // Whether a frame for the pose of `from_ns` counts: before the first display frame nobody sees it.
+  bool wants(TimeNs from_ns) const { return !seen_.empty() && from_ns >= seen_.front().first; }
   void add_frame(Frame frame);
   // What a display frame showed, with footprints from its eye. Times increase.
   void add_seen(TimeNs now_ns, scene::VisiblePatches seen);

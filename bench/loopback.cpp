@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
+#include <span>
 
 #include "base/camera_path.h"
 #include "base/log.h"
 #include "bench/coverage_meter.h"
 #include "bench/picture_streamer.h"
+#include "bench/scoring.h"
 #include "bench/shading_streamer.h"
 #include "bench/stream_simulation.h"
 #include "bench/truth_source.h"
@@ -17,6 +20,9 @@
 namespace tessera::bench {
 namespace {
 
+// Pixels a side of the picture of masked edges, and how much larger it is shown.
+constexpr uint32_t kMaskedWindow = 240, kMaskedScale = 2;
+
 double ms_since(TimeNs start) {
   return to_ms(SteadyClock().now() - start);
 }
@@ -24,8 +30,13 @@ double ms_since(TimeNs start) {
 // Means of the error with one cause after another switched off (EVALUATION: split).
 struct SplitMeans {
   ErrorMean coded, chroma_only, uncoded, fresh, seen;
-  uint64_t frames = 0;
 
+  void add(const SplitErrors& errors) {
+    chroma_only.add(errors.chroma_only);
+    uncoded.add(errors.uncoded);
+    fresh.add(errors.fresh);
+    seen.add(errors.seen);
+  }
   std::vector<SplitRow> rows() const {
     std::vector<SplitRow> rows;
     ImageError before = coded.mean();
@@ -56,19 +67,21 @@ class Loopback {
     std::unique_ptr<Streamer> streamer;
     std::unique_ptr<StreamSimulation> simulation;
     ErrorMean error;
+    EdgeSum near_masked;
     double draw_ms = 0;
   };
 
   Status set_up();
   Status add_baseline(PictureMethod method, const char* note);
-  Status show(Method& method, bool scored, const shading::ReferenceImage& truth, const DisplayMoment& moment,
-              FrameRecord& record);
-  Status score_ours(const shading::ReferenceImage& truth, const DisplayMoment& moment, FrameRecord& record);
-  Status score_split(const shading::ReferenceImage& truth, const DisplayMoment& moment,
-                     const Image8& uncoded_visible);
+  Status draw(Method& method, const DisplayMoment& moment, FramePictures* scored);
+  Status render_truth(const DisplayMoment& moment, FramePictures& pictures, FrameRecord& record);
+  // Compares the pictures of the last scored frame, between these two beside whatever else goes on.
+  void begin_scoring();
+  void end_scoring();
+  void keep_pictures(const FramePictures& pictures, const FrameScore& score);
+  void keep_picture(Picture picture);
   Status frame(uint32_t index);
-  void keep_picture(const char* label, uint32_t index, const Image8& truth, const Image8& shown,
-                    const Comparison& c);
+  StatusOr<uint32_t> estimate();
   void fill_rows();
 
   uint32_t frame_count() const {
@@ -84,6 +97,7 @@ class Loopback {
   std::shared_ptr<server::SharedScene> shared_;
   std::unique_ptr<TruthSource> truth_;
   std::optional<pvs::TriangleToPatch> patch_of_;
+  std::optional<MaskedTriangles> masked_;
 
   std::vector<Method> methods_;  // ours first
   ShadingStreamer* ours_ = nullptr;
@@ -92,6 +106,9 @@ class Loopback {
   double holes_sum_ = 0, server_ms_sum_ = 0;
   uint64_t scored_ = 0, stale_ = 0, server_frames_ = 0, samples_ = 0;
   double worst_mssim_ = 2;
+  uint64_t most_masked_edges_ = 0;  // in one picture's window
+  std::optional<FramePictures> unscored_;
+  std::future<FrameScore> scoring_;  // of unscored_; last, so that it ends first
 };
 
 Status Loopback::set_up() {
@@ -108,6 +125,7 @@ Status Loopback::set_up() {
   TESSERA_ASSIGN_OR_RETURN(truth_, TruthSource::create(shared_, settings_.scene, settings_.truth_cache,
                                                        settings_.truth == Truth::one ? 1 : 4));
   patch_of_.emplace(*scene_);
+  masked_.emplace(*scene_);
 
   TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<ShadingStreamer> ours,
                            ShadingStreamer::create(shared_, settings_));
@@ -134,91 +152,133 @@ Status Loopback::add_baseline(PictureMethod method, const char* note) {
   return absl::OkStatus();
 }
 
-void Loopback::keep_picture(const char* label, uint32_t index, const Image8& truth, const Image8& shown,
-                            const Comparison& c) {
-  const auto same = [&](const Picture& p) { return p.label == label; };
-  std::erase_if(result_.pictures, same);
-  result_.pictures.push_back({label, index, c.error.mssim, truth, shown, c.ssim});
+void Loopback::keep_picture(Picture picture) {
+  std::erase_if(result_.pictures, [&](const Picture& p) { return p.label == picture.label; });
+  result_.pictures.push_back(std::move(picture));
 }
 
-Status Loopback::show(Method& method, bool scored, const shading::ReferenceImage& truth,
-                      const DisplayMoment& moment, FrameRecord& record) {
+Status Loopback::draw(Method& method, const DisplayMoment& moment, FramePictures* scored) {
   const TimeNs start = SteadyClock().now();
-  TESSERA_ASSIGN_OR_RETURN(const Image8 shown, method.streamer->draw(moment.view));
+  TESSERA_ASSIGN_OR_RETURN(Image8 shown, method.streamer->draw(moment.view));
   method.draw_ms += ms_since(start);
   ++method.row.frames_displayed;
   if (!moment.fresh) ++method.row.frames_stale;
-  if (!scored) return absl::OkStatus();
-  const Comparison comparison = compare_images(truth.color, shown, truth.triangle_plus_one);
-  method.error.add(comparison.error);
-  record.mssim[method.row.method] = comparison.error.mssim;
-  record.psnr[method.row.method] = comparison.error.psnr;
-  if (method.streamer.get() != ours_) return absl::OkStatus();
-  if (moment.index == 0) keep_picture("first", 0, truth.color, shown, comparison);
-  if (moment.index == frame_count() / 2) keep_picture("middle", moment.index, truth.color, shown, comparison);
-  if (comparison.error.mssim < worst_mssim_) {
-    worst_mssim_ = comparison.error.mssim;
-    keep_picture("worst", moment.index, truth.color, shown, comparison);
-  }
+  if (scored) scored->shown.push_back(std::move(shown));
   return absl::OkStatus();
 }
 
-Status Loopback::score_ours(const shading::ReferenceImage& truth, const DisplayMoment& moment,
-                            FrameRecord& record) {
+Status Loopback::render_truth(const DisplayMoment& moment, FramePictures& pictures, FrameRecord& record) {
+  TESSERA_ASSIGN_OR_RETURN(pictures.truth, truth_->truth(moment.view, moment.path_time_ns));
+  const shading::ReferenceImage& truth = *pictures.truth;
   const auto has_triangle = [&](uint32_t triangle) { return ours_->has_patch((*patch_of_)[triangle]); };
   record.holes = hole_share(truth.triangle_plus_one, truth.covered, has_triangle);
   holes_sum_ += record.holes;
+  ++scored_;
   coverage_.add_seen(moment.now_ns, visible_patches(*scene_, truth.triangle_plus_one,
                                                     truth_->instant().instance_transforms(), moment.view));
   if (!settings_.split) return absl::OkStatus();
 
-  TESSERA_ASSIGN_OR_RETURN(const Image8 chroma_only, ours_->draw_uncoded_420(moment.view));
-  split_.chroma_only.add(compare_images(truth.color, chroma_only, truth.triangle_plus_one).error);
-  TESSERA_ASSIGN_OR_RETURN(const Image8 uncoded, ours_->draw_uncoded(moment.view));
-  split_.uncoded.add(compare_images(truth.color, uncoded, truth.triangle_plus_one).error);
-  TESSERA_ASSIGN_OR_RETURN(Image8 fresh, ours_->draw_fresh(moment.view, truth_->instant()));
-  split_.fresh.add(compare_images(truth.color, fresh, truth.triangle_plus_one).error);
+  SplitPictures& split = pictures.split.emplace();
+  TESSERA_ASSIGN_OR_RETURN(split.chroma_only, ours_->draw_uncoded_420(moment.view));
+  TESSERA_ASSIGN_OR_RETURN(split.uncoded, ours_->draw_uncoded(moment.view));
+  TESSERA_ASSIGN_OR_RETURN(split.fresh, ours_->draw_fresh(moment.view, truth_->instant()));
   // Visibility off: what the client could not know is filled in from the truth.
+  split.seen = split.fresh;
   for (size_t i = 0; i < truth.triangle_plus_one.size(); ++i) {
     const uint32_t id = truth.triangle_plus_one[i];
-    if (id != 0 && !has_triangle(id - 1)) std::copy_n(&truth.color.rgba[4 * i], 4, &fresh.rgba[4 * i]);
+    if (id != 0 && !has_triangle(id - 1)) std::copy_n(&truth.color.rgba[4 * i], 4, &split.seen.rgba[4 * i]);
   }
-  split_.seen.add(compare_images(truth.color, fresh, truth.triangle_plus_one).error);
   return absl::OkStatus();
 }
 
+void Loopback::begin_scoring() {
+  if (!unscored_) return;
+  scoring_ = std::async(std::launch::async, [this] { return score(*unscored_, *masked_); });
+}
+
+void Loopback::end_scoring() {
+  if (!unscored_) return;
+  const FrameScore score = scoring_.get();
+  const FramePictures& pictures = *unscored_;
+  FrameRecord& record = result_.frames[pictures.index];
+  for (size_t i = 0; i < methods_.size(); ++i) {
+    Method& method = methods_[i];
+    const ImageError& error = score.methods[i].error;
+    method.error.add(error);
+    record.mssim[method.row.method] = error.mssim;
+    record.psnr[method.row.method] = error.psnr;
+    if (!score.near_masked.empty()) method.near_masked.add(score.near_masked[i]);
+  }
+  if (score.split) split_.add(*score.split);
+  keep_pictures(pictures, score);
+  unscored_.reset();
+}
+
+void Loopback::keep_pictures(const FramePictures& pictures, const FrameScore& score) {
+  const Image8 &truth = pictures.truth->color, &shown = pictures.shown[0];
+  const Comparison& c = score.methods[0];
+  const auto keep = [&](const char* label) {
+    keep_picture({label, "", pictures.index, c.error.mssim, truth, shown, c.ssim});
+  };
+  if (pictures.index == 0) keep("first");
+  if (pictures.index == frame_count() / 2) keep("middle");
+  if (c.error.mssim < worst_mssim_) {
+    worst_mssim_ = c.error.mssim;
+    keep("worst");
+  }
+  if (score.masked_edges.empty()) return;
+  const Window window = busiest_window(score.masked_edges, truth.width, truth.height, kMaskedWindow);
+  if (window.edges <= most_masked_edges_) return;
+  most_masked_edges_ = window.edges;
+  keep_picture(
+      {"masked",
+       absl::StrFormat("%u x %u pixels from (%u, %u) on, %u times enlarged; of the pixels within 2 px of "
+                       "masked silhouettes in the whole frame",
+                       window.width, window.height, window.x, window.y, kMaskedScale),
+       pictures.index, score.near_masked[0].mean(), enlarged(truth, window, kMaskedScale),
+       enlarged(shown, window, kMaskedScale), enlarged(c.ssim, window, kMaskedScale)});
+}
+
+// What is measured (the server's frame, the client's picture) runs alone; the rest of the work shares the
+// processor with the comparisons of the frame before.
 Status Loopback::frame(uint32_t index) {
   const bool scored = index % settings_.score_every == 0;
+  FramePictures pictures{.index = index};
+  FramePictures* const to_score = scored ? &pictures : nullptr;
   FrameRecord record;
-  shading::ReferenceImage truth;
-  for (Method& method : methods_) {
-    const uint64_t rendered_before = method.simulation->frames_rendered();
-    TESSERA_ASSIGN_OR_RETURN(const DisplayMoment moment, method.simulation->next_display());
-    const bool is_ours = method.streamer.get() == ours_;
-    if (is_ours) {
-      if (method.simulation->frames_rendered() != rendered_before) {
-        const server::FrameStats& stats = ours_->last_stats();
-        server_ms_sum_ += stats.times.total_ms();
-        samples_ += stats.gather.samples;
-        ++server_frames_;
-      }
-      const FrameTimeline& shown = method.simulation->shown_frames().back();
-      record.time_ns = from_seconds(index / settings_.fps);
-      record.frame = moment.frame;
-      record.age_ms = to_ms(moment.now_ns - shown.pose_sent);
-      if (moment.fresh) {
-        record.atlas_bytes = shown.atlas_bytes;
-        record.meta_bytes = shown.meta_bytes;
-      }
-      if (scored) {
-        TESSERA_ASSIGN_OR_RETURN(truth, truth_->truth(moment.view, moment.path_time_ns));
-        ++scored_;
-      }
-    }
-    TESSERA_RETURN_IF_ERROR(show(method, scored, truth, moment, record));
-    if (is_ours && scored) TESSERA_RETURN_IF_ERROR(score_ours(truth, moment, record));
+
+  StreamSimulation& simulation = *methods_[0].simulation;
+  const uint64_t rendered_before = simulation.frames_rendered();
+  TESSERA_ASSIGN_OR_RETURN(const DisplayMoment moment, simulation.next_display());
+  if (simulation.frames_rendered() != rendered_before) {
+    const server::FrameStats& stats = ours_->last_stats();
+    server_ms_sum_ += stats.times.total_ms();
+    samples_ += stats.gather.samples;
+    ++server_frames_;
+  }
+  const FrameTimeline& shown = simulation.shown_frames().back();
+  record.time_ns = from_seconds(index / settings_.fps);
+  record.frame = moment.frame;
+  record.age_ms = to_ms(moment.now_ns - shown.pose_sent);
+  if (moment.fresh) {
+    record.atlas_bytes = shown.atlas_bytes;
+    record.meta_bytes = shown.meta_bytes;
+  }
+  TESSERA_RETURN_IF_ERROR(draw(methods_[0], moment, to_score));
+
+  begin_scoring();
+  if (scored) TESSERA_RETURN_IF_ERROR(render_truth(moment, pictures, record));
+  std::vector<DisplayMoment> moments;
+  for (Method& method : std::span(methods_).subspan(1)) {
+    TESSERA_ASSIGN_OR_RETURN(moments.emplace_back(), method.simulation->next_display());
+  }
+  end_scoring();
+
+  for (size_t i = 0; i < moments.size(); ++i) {
+    TESSERA_RETURN_IF_ERROR(draw(methods_[i + 1], moments[i], to_score));
   }
   result_.frames.push_back(std::move(record));
+  if (scored) unscored_ = std::move(pictures);
   return absl::OkStatus();
 }
 
@@ -227,6 +287,7 @@ void Loopback::fill_rows() {
     Row& row = method.row;
     const StreamSimulation& simulation = *method.simulation;
     row.error = method.error.mean();
+    if (method.near_masked.pixels) row.mssim_masked = method.near_masked.mean();
     row.mbps_atlas = simulation.megabits_per_second(Channel::atlas);
     row.mbps_meta = simulation.megabits_per_second(Channel::meta);
     row.mbps_total = row.mbps_atlas + row.mbps_meta;
@@ -277,24 +338,37 @@ void Loopback::fill_rows() {
   }
 }
 
+// Draws the first display frames and tells from them how long the others will take; how many there were.
+// Display frame 0 brings the first server frames with it, and compilers warm up; a whole round of server
+// frames and of scored ones follows.
+StatusOr<uint32_t> Loopback::estimate() {
+  const auto server_period = static_cast<uint32_t>(std::ceil(settings_.fps / settings_.server_fps));
+  const uint32_t period = std::max({1u, server_period, settings_.score_every});
+  const uint32_t first = std::min(2u, frame_count()), end = std::min(first + period, frame_count());
+  for (uint32_t i = 0; i < first; ++i) TESSERA_RETURN_IF_ERROR(frame(i));
+  const TimeNs start = SteadyClock().now();
+  for (uint32_t i = first; i < end; ++i) TESSERA_RETURN_IF_ERROR(frame(i));
+  const double frame_s = end > first ? 1e-3 * ms_since(start) / (end - first) : 0;
+  progress_.estimate(frame_s * (frame_count() - end));
+  return end;
+}
+
 StatusOr<LoopbackResult> Loopback::run() {
   TESSERA_RETURN_IF_ERROR(set_up());
   if (frame_count() == 0) return absl::InvalidArgumentError("--seconds and --fps give no display frame");
-  // The first display frame brings the first server frames with it and is timed for the estimate.
-  const TimeNs start = SteadyClock().now();
-  TESSERA_RETURN_IF_ERROR(frame(0));
-  TESSERA_RETURN_IF_ERROR(frame_count() > 1 ? frame(1) : absl::OkStatus());
-  progress_.estimate(1e-3 * ms_since(start) / 2 * (frame_count() - 2));
+  TESSERA_ASSIGN_OR_RETURN(const uint32_t done, estimate());
   if (settings_.estimate_only) {
     result_.frames.clear();
     result_.pictures.clear();
     return std::move(result_);
   }
-  progress_.begin("display frames", frame_count());
-  for (uint32_t i = 2; i < frame_count(); ++i) {
+  progress_.begin("display frames", frame_count() - done);
+  for (uint32_t i = done; i < frame_count(); ++i) {
     TESSERA_RETURN_IF_ERROR(frame(i));
     progress_.advance();
   }
+  begin_scoring();
+  end_scoring();
   fill_rows();
   return std::move(result_);
 }

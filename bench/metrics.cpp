@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "bench/borders.h"
 #include "bench/color_difference.h"
 
 namespace tessera::bench {
@@ -49,27 +50,13 @@ double mean_ssim7(const Image8& truth, const Image8& shown) {
   return sum / 3;
 }
 
-// 1 where a pixel touches one of another id, left, right, above or below: it is within 1 px of the border.
-std::vector<uint8_t> border_pixels(std::span<const uint32_t> ids, uint32_t width, uint32_t height) {
-  std::vector<uint8_t> border(ids.size());
-  for (uint32_t y = 0; y < height; ++y) {
-    for (uint32_t x = 0; x < width; ++x) {
-      const size_t i = size_t{y} * width + x;
-      if (x + 1 < width && ids[i] != ids[i + 1]) border[i] = border[i + 1] = 1;
-      if (y + 1 < height && ids[i] != ids[i + width]) border[i] = border[i + width] = 1;
-    }
-  }
-  return border;
-}
-
-bool any_in_3x3(const std::vector<uint8_t>& mask, uint32_t width, uint32_t height, uint32_t x, uint32_t y) {
-  const uint32_t x1 = std::min(x + 1, width - 1), y1 = std::min(y + 1, height - 1);
-  for (uint32_t v = y > 0 ? y - 1 : 0; v <= y1; ++v) {
-    for (uint32_t u = x > 0 ? x - 1 : 0; u <= x1; ++u) {
-      if (mask[size_t{v} * width + u]) return true;
-    }
-  }
-  return false;
+// Fills in mssim and psnr, and leaves the map.
+Plane measure_luma(const Image8& truth, const Image8& shown, ImageError& error) {
+  const Plane luma_truth = luma(truth), luma_shown = luma(shown);
+  Plane map = ssim_map(luma_truth, luma_shown, gaussian_window(11, 2));
+  error.mssim = mean(map);
+  error.psnr = psnr_db(mean_squared_difference(luma_truth, luma_shown));
+  return map;
 }
 
 }  // namespace
@@ -98,16 +85,20 @@ double delta_e_near_borders(const Image8& truth, const Image8& shown,
 
 Comparison compare_images(const Image8& truth, const Image8& shown, std::span<const uint32_t> triangle_ids) {
   assert(truth.width == shown.width && truth.height == shown.height);
-  const Plane luma_truth = luma(truth), luma_shown = luma(shown);
   Comparison result;
-  result.ssim = ssim_map(luma_truth, luma_shown, gaussian_window(11, 2));
   ImageError& error = result.error;
-  error.mssim = mean(result.ssim);
-  error.psnr = psnr_db(mean_squared_difference(luma_truth, luma_shown));
+  result.ssim = measure_luma(truth, shown, error);
   error.ssim7 = mean_ssim7(truth, shown);
   measure_channels(truth, shown, error);
   if (!triangle_ids.empty()) error.delta_e_borders = delta_e_near_borders(truth, shown, triangle_ids);
   return result;
+}
+
+ImageError compare_luma(const Image8& truth, const Image8& shown) {
+  assert(truth.width == shown.width && truth.height == shown.height);
+  ImageError error;
+  measure_luma(truth, shown, error);
+  return error;
 }
 
 double hole_share(std::span<const uint32_t> triangle_plus_one, std::span<const uint8_t> covered,

@@ -36,6 +36,9 @@ struct Comparison {
 Comparison compare_images(const Image8& truth, const Image8& shown,
                           std::span<const uint32_t> triangle_ids = {});
 
+// Only mssim and psnr, in a fraction of the time.
+ImageError compare_luma(const Image8& truth, const Image8& shown);
+
 double psnr_db(double mean_squared_error);
 
 // Mean CIEDE2000 over the pixels within 2 px of a border between different ids; 0 if there is none.

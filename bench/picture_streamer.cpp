@@ -15,7 +15,7 @@ namespace {
 
 struct SourcePicture {
   View view;
-  std::vector<float> depth;  // mesh warping only
+  RenderedImage rendered;
 };
 
 }  // namespace
@@ -76,14 +76,14 @@ std::string PictureStreamer::name() const {
 StatusOr<std::vector<Packet>> PictureStreamer::serve(const ServeRequest& request) {
   const View view = impl_->source_view(request.poses.back().pose);
   const bool with_depth = impl_->method == PictureMethod::mesh_warp;
-  TESSERA_ASSIGN_OR_RETURN(shading::ReferenceImage rendered,
+  TESSERA_ASSIGN_OR_RETURN(const RenderedImage rendered,
                            impl_->source.render(view, request.scene_time_ns, {.depth = with_depth}));
   const bool key_frame = std::exchange(impl_->first, false) || request.key_frame;
-  const YuvImage yuv = codec::rgb_to_yuv(rendered.color);
+  const YuvImage yuv = codec::rgb_to_yuv(rendered->color);
   TESSERA_ASSIGN_OR_RETURN(codec::AccessUnit unit,
                            impl_->encoder->encode(request.number, codec::view_of(yuv),
                                                   impl_->rate.atlas_bits(0, key_frame), key_frame));
-  impl_->sources[request.number] = {view, std::move(rendered.depth)};
+  impl_->sources[request.number] = {view, rendered};
   std::vector<Packet> packets;
   packets.push_back({Channel::atlas, std::move(unit.bytes)});
   return packets;
@@ -99,7 +99,7 @@ Status PictureStreamer::deliver(Channel, std::span<const uint8_t> bytes) {
   std::erase_if(impl_->sources, [&](const auto& entry) { return is_newer(decoded.frame, entry.first); });
   if (!impl_->warp) return absl::OkStatus();
   const SourcePicture& source = impl_->sources.at(decoded.frame);
-  return impl_->warp->set_source(source.view, impl_->picture, source.depth);
+  return impl_->warp->set_source(source.view, impl_->picture, source.rendered->depth);
 }
 
 bool PictureStreamer::wants_key_frame() const {

@@ -32,6 +32,7 @@ StatusOr<json> write_pictures(const fs::path& folder, const std::string& run,
   for (const Picture& picture : pictures) {
     const std::string stem = absl::StrCat(run, "-", picture.label, "-");
     json entry{{"label", picture.label}, {"display_frame", picture.display_frame}, {"mssim", picture.mssim}};
+    if (!picture.note.empty()) entry["note"] = picture.note;
     const auto write = [&](const char* kind, const Image8& image) {
       entry[kind] = stem + kind + ".png";
       return write_png(folder / (stem + kind + ".png"), image);

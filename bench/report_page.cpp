@@ -1,5 +1,6 @@
 #include "bench/report_page.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -88,6 +89,7 @@ constexpr Column kColumns[] = {{"MSSIM", "mssim", 4},
                                {"PSNR dB", "psnr", 2},
                                {"PSNR RGB", "psnr_rgb", 2},
                                {"SSIM 7×7", "ssim7", 4},
+                               {"MSSIM at masked edges", "mssim_masked", 4},
                                {"ΔE00 at borders", "delta_e_borders", 2},
                                {"L∞", "linf", 3},
                                {"holes %", "holes", 3, 100},
@@ -104,14 +106,25 @@ constexpr Column kColumns[] = {{"MSSIM", "mssim", 4},
                                {"server ms", "server_ms", 1},
                                {"client ms", "client_ms", 1}};
 
+// What no row has, e.g. masked edges in a scene without masked materials, is no column.
+std::vector<Column> columns_of(const json& rows) {
+  std::vector<Column> columns;
+  for (const Column& column : kColumns) {
+    const auto has = [&](const json& row) { return row.contains(column.field); };
+    if (std::any_of(rows.begin(), rows.end(), has)) columns.push_back(column);
+  }
+  return columns;
+}
+
 std::string rows_table(const json& rows) {
+  const std::vector<Column> columns = columns_of(rows);
   std::string html = "<div class=\"scroll\"><table><tr><th>method</th>";
-  for (const Column& column : kColumns) absl::StrAppend(&html, "<th>", column.title, "</th>");
+  for (const Column& column : columns) absl::StrAppend(&html, "<th>", column.title, "</th>");
   html += "</tr>\n";
   for (const json& row : rows) {
     const std::string session = row.value("session", 0) ? absl::StrCat(" #", row["session"].get<int>()) : "";
     absl::StrAppend(&html, "<tr><td>", escape(row.at("method").get<std::string>()), session, "</td>");
-    for (const Column& column : kColumns) {
+    for (const Column& column : columns) {
       absl::StrAppend(&html, "<td>", number(row, column.field, column.decimals, column.scale), "</td>");
     }
     html += "</tr>\n";
@@ -181,9 +194,10 @@ std::string pictures_html(const std::filesystem::path& folder, const json& pictu
       data_uri("image/png", absl::string_view(reinterpret_cast<const char*>(legend.data()), legend.size())),
       "\"> to ", absl::StrFormat("%.2f", kDssimFullScale), " and above.</p>\n");
   for (const json& picture : pictures) {
+    const std::string note = picture.value("note", std::string());
     absl::StrAppend(&html, "<p><b>", escape(picture.at("label").get<std::string>()), "</b>, display frame ",
-                    picture.value("display_frame", 0), ", MSSIM ", number(picture, "mssim", 4),
-                    "</p>\n<div class=\"triple\">\n");
+                    picture.value("display_frame", 0), note.empty() ? "" : ", ", escape(note), ", MSSIM ",
+                    number(picture, "mssim", 4), "</p>\n<div class=\"triple\">\n");
     html += picture_html(folder, picture.at("truth").get<std::string>(), "truth");
     html += picture_html(folder, picture.at("shown").get<std::string>(), "client");
     html += picture_html(folder, picture.at("dssim").get<std::string>(), "DSSIM");

@@ -49,6 +49,7 @@ json to_json(const Row& row) {
   if (row.coverage) j["coverage"] = *row.coverage;
   if (row.coverage_without_prediction) j["coverage_without_prediction"] = *row.coverage_without_prediction;
   if (row.overestimation) j["overestimation"] = *row.overestimation;
+  if (row.mssim_masked) j["mssim_masked"] = *row.mssim_masked;
   if (row.tiling_error_ms_max) j["tiling_error_ms_max"] = *row.tiling_error_ms_max;
   if (row.end_to_end_ms) j["end_to_end_ms"] = to_json(*row.end_to_end_ms);
   for (const auto& [name, p] : row.durations_ms) j["durations_ms"][name] = to_json(p);

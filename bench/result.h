@@ -31,6 +31,7 @@ struct Row {
   std::string note;  // what a reader must know, e.g. "depth is not counted"
   ImageError error;
   std::optional<double> holes, coverage, coverage_without_prediction, overestimation;
+  std::optional<double> mssim_masked;  // SSIM within 2 px of masked silhouettes, mean over these pixels
   double mbps_total = 0, mbps_atlas = 0, mbps_meta = 0;
   uint64_t frames_displayed = 0;                    // scored or not
   uint64_t frames_stale = 0;                        // displayed again without a newer pair
@@ -61,7 +62,8 @@ struct FrameRecord {
 };
 
 struct Picture {
-  std::string label;  // "first", "median", "worst"
+  std::string label;  // "first", "middle", "worst", "masked"
+  std::string note;   // what the picture and `mssim` are of, if not a whole display frame
   uint64_t display_frame = 0;
   double mssim = 0;
   Image8 truth, shown;

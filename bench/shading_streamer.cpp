@@ -92,6 +92,7 @@ struct ShadingStreamer::Impl {
   // come.
   Status meter_coverage(const ServeRequest& request) {
     const TimedPose& newest = request.poses.back();
+    if (!meter->wants(newest.time_ns)) return absl::OkStatus();
     const std::span<const View> predicted = session->views();
     CoverageMeter::Frame frame{.from_ns = newest.time_ns, .to_ns = newest.time_ns + session->horizon_ns()};
     for (const atlas::Placement& p : session->placements()) frame.placed.push_back({p.patch, {}});

@@ -98,7 +98,15 @@ struct StreamSimulation::Impl {
     const TimeNs since_start = started ? std::max<TimeNs>(now - *started, 0) : 0;
     return from_seconds(settings.start_s) + since_start;
   }
-  Pose pose_at(TimeNs now) const { return path.at(path.poses().front().time_ns + path_time(now)); }
+  // Counted in display frames, so that all methods meet the same poses to the last bit, whenever they
+  // started.
+  TimeNs display_path_time() const {
+    return from_seconds(settings.start_s) + (started ? tick(scored, settings.fps) : 0);
+  }
+  Pose pose_on_path(TimeNs path_time_ns) const {
+    return path.at(path.poses().front().time_ns + path_time_ns);
+  }
+  Pose pose_at(TimeNs now) const { return pose_on_path(path_time(now)); }
 
   // Earliest thing that happens after the last one, and what it is; ties in this order.
   enum class Event { delivery, pose, rendered, serve, display };
@@ -190,11 +198,12 @@ struct StreamSimulation::Impl {
     if (fresh) note_shown(now, *frame);
     current = frame;
 
-    const Pose pose = pose_at(now);
+    const TimeNs on_path = display_path_time();
+    const Pose pose = pose_on_path(on_path);
     up.send(now, Channel::meta, to_bytes({{now, pose}, measured_round_trip, streamer.wants_key_frame()}));
     if (!frame) return std::nullopt;
     DisplayMoment moment{
-        .index = scored++, .now_ns = now, .path_time_ns = path_time(now), .frame = *frame, .fresh = fresh};
+        .index = scored++, .now_ns = now, .path_time_ns = on_path, .frame = *frame, .fresh = fresh};
     moment.view = client_view(settings);
     moment.view.pose = pose;
     return moment;

@@ -129,15 +129,25 @@ Status TruthCache::store(const TruthKey& key, const shading::ReferenceImage& ima
   return absl::OkStatus();
 }
 
-StatusOr<shading::ReferenceImage> TruthCache::get(
-    const TruthKey& key, absl::FunctionRef<StatusOr<shading::ReferenceImage>()> render) {
-  if (auto cached = find(key)) return *std::move(cached);
-  TESSERA_ASSIGN_OR_RETURN(shading::ReferenceImage image, render());
-  if (const Status stored = store(key, image); !stored.ok()) {
+void TruthCache::finish_storing() {
+  const std::lock_guard lock(storing_mutex_);
+  if (storing_.valid()) storing_.get();
+}
+
+StatusOr<RenderedImage> TruthCache::get(const TruthKey& key,
+                                        absl::FunctionRef<StatusOr<RenderedImage>()> render) {
+  finish_storing();
+  if (auto cached = find(key)) return std::make_shared<const shading::ReferenceImage>(*std::move(cached));
+  TESSERA_ASSIGN_OR_RETURN(RenderedImage image, render());
+  if (folder_.empty()) return image;
+  const std::lock_guard storing_lock(storing_mutex_);
+  storing_ = std::async(std::launch::async, [this, key, image] {
+    const Status stored = store(key, *image);
+    if (stored.ok()) return;
     const std::lock_guard lock(mutex_);
     if (!store_failure_logged_) spdlog::warn("truth cache: {}", stored.ToString());
     store_failure_logged_ = true;
-  }
+  });
   return image;
 }
 

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <future>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -13,6 +15,9 @@
 #include "shading/reference.h"
 
 namespace tessera::bench {
+
+// Read by several at once, beside the rendering of the next one.
+using RenderedImage = std::shared_ptr<const shading::ReferenceImage>;
 
 // Everything that decides a picture's pixels.
 struct TruthKey {
@@ -47,9 +52,9 @@ class TruthCache {
   std::optional<shading::ReferenceImage> find(const TruthKey& key);
   Status store(const TruthKey& key, const shading::ReferenceImage& image);
 
-  // From the cache, or rendered and then kept. A failure to store is logged once and is no error.
-  StatusOr<shading::ReferenceImage> get(const TruthKey& key,
-                                        absl::FunctionRef<StatusOr<shading::ReferenceImage>()> render);
+  // From the cache, or rendered and then kept: packing and writing go on beside the caller's work, until the
+  // next get() or the end. A failure to store is logged once and is no error.
+  StatusOr<RenderedImage> get(const TruthKey& key, absl::FunctionRef<StatusOr<RenderedImage>()> render);
 
   struct Stats {
     uint64_t hits = 0, misses = 0, bytes = 0;
@@ -62,6 +67,7 @@ class TruthCache {
     uint64_t bytes;
   };
 
+  void finish_storing();
   void touch(const std::string& name);
   void remove_oldest(uint64_t bytes_needed);
   void add(const std::filesystem::path& file, uint64_t bytes);
@@ -75,6 +81,8 @@ class TruthCache {
   std::map<uint64_t, Entry> by_use_;        // oldest use first
   std::map<std::string, uint64_t> use_of_;  // file name → key in by_use_
   uint64_t next_use_ = 0;
+  std::mutex storing_mutex_;   // of storing_; taken before mutex_
+  std::future<void> storing_;  // last, so that it ends first
 };
 
 }  // namespace tessera::bench

@@ -50,8 +50,20 @@ TEST(Report, OnePageWithTablesPicturesAndCauses) {
   EXPECT_THAT(html, HasSubstr("<td>sampling</td><td>0.9800</td>"));
   EXPECT_THAT(html, HasSubstr("depth is not counted"));
   EXPECT_THAT(html, HasSubstr("1 directional light"));
-  EXPECT_EQ(count(html, "data:image/jpeg;base64,"), 6u);  // two triples
+  EXPECT_EQ(count(html, "data:image/jpeg;base64,"), 9u);  // three triples
+  EXPECT_THAT(html, HasSubstr("MSSIM at masked edges"));
+  EXPECT_THAT(html, HasSubstr("<td>0.8765</td>"));
+  EXPECT_THAT(html, HasSubstr("enlarged twice"));
   EXPECT_EQ(count(html, "<h2>"), 1u);
+}
+
+TEST(Report, ASceneWithoutMaskedMaterialsHasNoSuchColumn) {
+  const TemporaryFolder folder;
+  LoopbackResult result = sample_result();
+  result.rows[0].mssim_masked.reset();
+  ASSERT_TRUE(write_run(folder.path(), result).ok());
+  ASSERT_TRUE(write_report(folder.path()).ok());
+  EXPECT_THAT(page(folder.path()), Not(HasSubstr("masked edges")));
 }
 
 TEST(Report, IsSelfContainedAndEscaped) {

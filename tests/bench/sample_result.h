@@ -35,6 +35,7 @@ inline LoopbackResult sample_result() {
   row.tiling_error_ms_max = 0.1;
   row.server_ms = 40;
   row.client_ms = 12;
+  row.mssim_masked = 0.8765;
   result.rows = {
       row,
       {.method = "mesh-warp", .note = "depth is not counted", .error = {.mssim = 0.9}, .server_ms = 30},
@@ -49,7 +50,8 @@ inline LoopbackResult sample_result() {
     frame.mssim = {{"tessera", 0.96 + 0.01 * std::sin(i)}, {"mesh-warp", 0.9}, {"plain-video", 0.6}};
     result.frames.push_back(frame);
   }
-  result.pictures = {sample_picture("first"), sample_picture("worst")};
+  result.pictures = {sample_picture("first"), sample_picture("worst"), sample_picture("masked")};
+  result.pictures[2].note = "enlarged twice";
   return result;
 }
 

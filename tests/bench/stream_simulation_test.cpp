@@ -75,6 +75,19 @@ TEST(StreamSimulation, PathStandsStillUntilTheFirstFrameAndThenRuns) {
   }
 }
 
+TEST(StreamSimulation, TheSamePosesWheneverTheFirstFrameCame) {
+  const CameraPath path = moving_path();
+  FakeStreamer small(1000), large(200'000);
+  StreamSimulation early(small, path, settings()), late(large, path, settings());
+  for (int i = 0; i < 60; ++i) {
+    const auto a = early.next_display(), b = late.next_display();
+    ASSERT_TRUE(a.ok() && b.ok());
+    ASSERT_LT(a->now_ns, b->now_ns);
+    EXPECT_EQ(a->view.pose.position.x, b->view.pose.position.x) << i;
+    EXPECT_EQ(a->path_time_ns, b->path_time_ns) << i;
+  }
+}
+
 TEST(StreamSimulation, DurationsTileTheEndToEndTime) {
   FakeStreamer streamer(40'000);
   const CameraPath path = moving_path();

@@ -69,9 +69,9 @@ TEST(TruthKey, EveryPartCounts) {
 TEST(TruthCache, RendersOnceAndFindsItInTheNextRun) {
   const TemporaryFolder folder;
   int rendered = 0;
-  const auto render = [&]() -> StatusOr<shading::ReferenceImage> {
+  const auto render = [&]() -> StatusOr<RenderedImage> {
     ++rendered;
-    return sample_truth();
+    return std::make_shared<const shading::ReferenceImage>(sample_truth());
   };
   for (int run = 0; run < 2; ++run) {
     auto cache = TruthCache::open(folder.path());
@@ -79,7 +79,7 @@ TEST(TruthCache, RendersOnceAndFindsItInTheNextRun) {
     for (int i = 0; i < 2; ++i) {
       const auto image = (*cache)->get(sample_key(), render);
       ASSERT_TRUE(image.ok());
-      EXPECT_TRUE(same(*image, sample_truth()));
+      EXPECT_TRUE(same(**image, sample_truth()));
     }
   }
   EXPECT_EQ(rendered, 1);
@@ -113,9 +113,9 @@ TEST(TruthCache, ADamagedFileIsReplaced) {
   ASSERT_TRUE(cache->store(sample_key(), sample_truth()).ok());
   ASSERT_TRUE(write_file(entries(folder.path()).at(0), "garbage").ok());
   int rendered = 0;
-  const auto render = [&]() -> StatusOr<shading::ReferenceImage> {
+  const auto render = [&]() -> StatusOr<RenderedImage> {
     ++rendered;
-    return sample_truth();
+    return std::make_shared<const shading::ReferenceImage>(sample_truth());
   };
   EXPECT_TRUE(cache->get(sample_key(), render).ok());
   EXPECT_TRUE(cache->get(sample_key(), render).ok());
@@ -156,8 +156,8 @@ TEST(TruthCache, WithoutAFolderNothingIsKept) {
 
 TEST(TruthCache, AFailedRenderIsPassedOn) {
   TruthCache cache;
-  const auto image = cache.get(
-      sample_key(), []() -> StatusOr<shading::ReferenceImage> { return absl::InternalError("lost"); });
+  const auto image =
+      cache.get(sample_key(), []() -> StatusOr<RenderedImage> { return absl::InternalError("lost"); });
   EXPECT_EQ(image.status().message(), "lost");
 }
 

@@ -38,11 +38,11 @@ TEST(TruthCacheThreads, EveryoneGetsTheirOwnPicture) {
       threads.emplace_back([&, t] {
         for (uint32_t i = 0; i < kGets; ++i) {
           const uint32_t picture = (t + i) % kPictures;
-          const auto image = (*cache)->get(key_of(picture), [&]() -> StatusOr<shading::ReferenceImage> {
+          const auto image = (*cache)->get(key_of(picture), [&]() -> StatusOr<RenderedImage> {
             ++rendered;
-            return picture_of(picture);
+            return std::make_shared<const shading::ReferenceImage>(picture_of(picture));
           });
-          if (image.ok() && image->color.rgba == picture_of(picture).color.rgba) ++right;
+          if (image.ok() && (*image)->color.rgba == picture_of(picture).color.rgba) ++right;
         }
       });
     }
