@@ -34,6 +34,9 @@ class ByteReader {
   std::span<const uint8_t> rest() { return bytes(remaining()); }
   void skip(size_t count) { take(count); }
 
+  // Latches the error: a value was out of range.
+  void fail() { ok_ = false; }
+
   size_t remaining() const { return ok_ ? bytes_.size() - at_ : 0; }
   bool ok() const { return ok_; }
   // Everything was read, and nothing more than there was.
