@@ -24,7 +24,9 @@ bool have_program(const std::string& name) {
   return false;
 }
 
-ChildProcess::ChildProcess(const std::vector<std::string>& command, const std::string& log_file) {
+ChildProcess::ChildProcess(const std::string& command_line, const std::string& log_file) {
+  std::istringstream in(command_line);
+  const std::vector<std::string> command{std::istream_iterator<std::string>(in), {}};
   std::vector<char*> arguments;
   for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);

@@ -14,8 +14,8 @@ bool have_program(const std::string& name);
 
 class ChildProcess {
  public:
-  // Its output goes to `log_file`.
-  ChildProcess(const std::vector<std::string>& command, const std::string& log_file);
+  // Arguments are parted by blanks; there are no quotes. Its output goes to `log_file`.
+  ChildProcess(const std::string& command_line, const std::string& log_file);
   ~ChildProcess();  // kills it if it still runs
   ChildProcess(const ChildProcess&) = delete;
 

@@ -270,6 +270,7 @@ TEST_F(MetaSockets, WaitingConnectionsAreBounded) {
   }
   ASSERT_TRUE(run_until([&] { return ended == 7; }));
   for (tcp::socket& c : clients) c.close();
+  ASSERT_TRUE(run_until([&] { return ended == 10; }));
 }
 
 TEST_F(MetaSockets, TlsCarriesTheSameAndChecksTheServer) {
