@@ -41,13 +41,15 @@ StatusOr<std::string> make_sdp(const SdpSettings& settings, std::span<const uint
   std::string sdp =
       absl::StrCat("v=0\r\n", "o=- ", settings.stream.ssrc, " 1 IN ", family, " ", settings.address, "\r\n",
                    "s=Tessera atlas\r\n", "c=IN ", family, " ", settings.address, "\r\n", "t=0 0\r\n");
-  absl::StrAppend(&sdp, "m=video ", settings.port, settings.retransmission ? " RTP/AVPF " : " RTP/AVP ",
-                  media);
+  absl::StrAppend(&sdp, "m=video ", settings.port, " RTP/", settings.srtp ? "S" : "",
+                  settings.retransmission ? "AVPF " : "AVP ", media);
   if (settings.retransmission) absl::StrAppend(&sdp, " ", unsigned{settings.stream.rtx_payload_type});
   absl::StrAppend(&sdp, "\r\na=recvonly\r\na=rtcp-mux\r\na=rtpmap:", media, " H264/90000\r\n");
   absl::StrAppend(&sdp, "a=fmtp:", media, " packetization-mode=1;profile-level-id=",
                   absl::BytesToHexString({reinterpret_cast<const char*>(sets.sps.data()) + 1, 3}),
                   ";sprop-parameter-sets=", base64(sets.sps), ",", base64(sets.pps), "\r\n");
+  if (settings.srtp)
+    absl::StrAppend(&sdp, "a=crypto:1 AES_CM_128_HMAC_SHA1_80 inline:", base64(*settings.srtp), "\r\n");
   if (settings.retransmission) absl::StrAppend(&sdp, retransmission_lines(settings.stream));
   absl::StrAppend(&sdp, "a=ssrc:", settings.stream.ssrc, " cname:", settings.cname, "\r\n");
   return sdp;

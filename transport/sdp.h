@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
 #include "base/status.h"
+#include "transport/messages.h"
 #include "transport/rtp_sender.h"
 
 namespace tessera::transport {
@@ -17,6 +19,8 @@ struct SdpSettings {
   StreamIds stream;
   std::string cname = "tessera";
   bool retransmission = true;  // offer NACK, PLI and RTX
+  // Of what the server sends (RFC 4568): keep the text as secret as the key.
+  std::optional<SrtpKey> srtp = std::nullopt;
 };
 
 // `parameter_sets`: an access unit (Annex B) with SPS and PPS, i.e. any key frame. InvalidArgument: it has

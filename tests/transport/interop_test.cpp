@@ -16,6 +16,7 @@
 #include "transport/rtp_receiver.h"
 #include "transport/rtp_sender.h"
 #include "transport/sdp.h"
+#include "transport/srtp.h"
 
 namespace tessera::transport {
 namespace {
@@ -79,8 +80,9 @@ uint16_t free_port_pair(asio::io_context& io) {
 // Sends the clip over and over, in real time, to a player that may begin to listen at any time.
 class Broadcast {
  public:
-  Broadcast(asio::io_context& io, uint16_t port, uint16_t rtcp_port, double loss)
-      : timer_(io), rtcp_(address(rtcp_port)), rtp_(address(port)), loss_(loss) {
+  Broadcast(asio::io_context& io, uint16_t port, uint16_t rtcp_port, double loss,
+            std::unique_ptr<Srtp> srtp = nullptr)
+      : srtp_(std::move(srtp)), timer_(io), rtcp_(address(rtcp_port)), rtp_(address(port)), loss_(loss) {
     sender_ = *RtpSender::create({.seed = 11, .report_interval_ns = 200 * kNsPerMs});
     socket_ = *UdpSocket::open(asio::make_strand(io.get_executor()), {},
                                [this](const PeerAddress&, std::span<const uint8_t> d) {
@@ -114,6 +116,7 @@ class Broadcast {
       const bool rtcp = classify(d) == DatagramKind::rtcp;
       const bool first_time = !rtcp && (d[1] & 0x7f) == 96;
       if (first_time && std::uniform_real_distribution<>()(random_) < loss_) continue;
+      if (srtp_ && !srtp_->protect(d).ok()) ADD_FAILURE() << "SRTP";
       socket_->send(rtcp ? rtcp_ : rtp_, std::move(d));
     }
     timer_.expires_after(std::chrono::nanoseconds(
@@ -123,6 +126,7 @@ class Broadcast {
     });
   }
 
+  std::unique_ptr<Srtp> srtp_;
   SteadyClock clock_;
   asio::steady_timer timer_;
   PeerAddress rtcp_, rtp_;
@@ -162,16 +166,21 @@ class Interop : public test::AsioTest {
 
 TEST_F(Interop, FfmpegPlaysOurStream) {
   if (!test::have_program("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
-  for (bool retransmission : {false, true}) {
+  SrtpKey key;
+  for (size_t i = 0; i < key.size(); ++i) key[i] = static_cast<uint8_t>(7 * i + 1);
+  for (const auto& [retransmission, encrypted] :
+       {std::pair(false, false), std::pair(true, false), std::pair(false, true)}) {
     const uint16_t port = free_port_pair(io);
-    Broadcast broadcast(io, port, port, 0);
-    const auto sdp =
-        make_sdp({.port = port, .stream = broadcast.sender().ids(), .retransmission = retransmission},
-                 clip().units[0]);
+    Broadcast broadcast(io, port, port, 0, encrypted ? *Srtp::create(key, key) : nullptr);
+    const auto sdp = make_sdp({.port = port,
+                               .stream = broadcast.sender().ids(),
+                               .retransmission = retransmission,
+                               .srtp = encrypted ? std::optional(key) : std::nullopt},
+                              clip().units[0]);
     ASSERT_TRUE(sdp.ok()) << sdp.status();
     test::write_file(folder.file("x.sdp"), *sdp);
     test::ChildProcess ffmpeg(
-        absl::StrCat("ffmpeg -hide_banner -nostdin -y -protocol_whitelist file,udp,rtp -i ",
+        absl::StrCat("ffmpeg -hide_banner -nostdin -y -protocol_whitelist file,udp,rtp,srtp -i ",
                      folder.file("x.sdp"), " -vsync passthrough -frames:v 50 -f rawvideo -pix_fmt yuv420p ",
                      folder.file("out.yuv")),
         folder.file("log"));

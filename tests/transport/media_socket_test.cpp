@@ -195,6 +195,49 @@ TEST_F(MediaSockets, ANewAddressTakesOver) {
   EXPECT_EQ(port->binding_stats().rebound, 1u);
 }
 
+TEST_F(MediaSockets, SrtpCarriesMediaAndFeedback) {
+  SrtpKeys keys, wrong;
+  keys.server.fill(1);
+  keys.client.fill(2);
+  wrong.server.fill(3);
+  int bound = 0, requests = 0, poses = 0;
+  auto sender = *RtpSender::create({.seed = 1});
+  const StreamIds ids = sender->ids();
+  MediaSessionEvents events{.on_bound = [&] { ++bound; },
+                            .on_pose = [&](const SequencedPose&) { ++poses; },
+                            .on_key_frame_request = [&] { ++requests; }};
+  ASSERT_TRUE(port->add_session(1, token(1), std::move(sender), std::move(events), keys).ok());
+  std::vector<ReceivedFrame> frames;
+  MediaClientSettings settings = settings_of(1, ids);
+  std::mt19937_64 random(4);
+
+  // Without the keys nothing is understood.
+  settings.srtp = wrong;
+  const auto stranger =
+      connect(settings, {.on_frame = [&](ReceivedFrame f) { frames.push_back(std::move(f)); }});
+  ASSERT_TRUE(run_until([&] { return bound == 1; }));
+  ASSERT_TRUE(port->send_frame(1, clock.now(), test::make_access_unit(true, 3000, random), true).ok());
+  ASSERT_TRUE(run_until([&] { return port->sender_stats(1)->packets >= 5; }));
+  stranger->close();
+  EXPECT_TRUE(frames.empty());
+  EXPECT_EQ(stranger->stats().packets, 0u);
+
+  settings.srtp = keys;
+  settings.receiver.first_sequence.reset();
+  const auto client =
+      connect(settings, {.on_frame = [&](ReceivedFrame f) { frames.push_back(std::move(f)); }});
+  ASSERT_TRUE(run_until([&] { return bound == 2 && client->round_trip_ns(); }));
+  EXPECT_FALSE(client->send_pose({}));
+  const Bytes unit = test::make_access_unit(true, 30'000, random);
+  ASSERT_TRUE(port->send_frame(1, clock.now(), unit, true).ok());
+  ASSERT_TRUE(run_until([&] { return frames.size() == 1; }));
+  EXPECT_TRUE(frames[0].complete);
+  EXPECT_EQ(frames[0].access_unit, unit);
+  client->request_key_frame();
+  ASSERT_TRUE(run_until([&] { return requests > 0; }));
+  EXPECT_EQ(poses, 0);
+}
+
 // The same from several threads at once, for the thread sanitizer.
 TEST_F(MediaSockets, ManyThreads) {
   constexpr int kSessions = 3, kFrames = 30;

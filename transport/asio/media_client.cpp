@@ -24,6 +24,9 @@ StatusOr<std::shared_ptr<MediaClient>> MediaClient::open(asio::any_io_executor e
   TESSERA_ASSIGN_OR_RETURN(const asio::ip::address server, parse_address(settings.server_address));
   const asio::any_io_executor strand = asio::make_strand(executor);
   std::shared_ptr<MediaClient> self(new MediaClient(strand, settings, clock, std::move(events)));
+  if (settings.srtp) {
+    TESSERA_ASSIGN_OR_RETURN(self->srtp_, Srtp::create(settings.srtp->client, settings.srtp->server));
+  }
   self->server_ = peer_address({server, settings.server_port});
   UdpSocketSettings socket;
   socket.address = settings.bind_address;
@@ -42,9 +45,27 @@ StatusOr<std::shared_ptr<MediaClient>> MediaClient::open(asio::any_io_executor e
 void MediaClient::close(const std::string& reason) {
   const std::lock_guard lock(mutex_);
   if (std::exchange(closed_, true)) return;
-  if (bound_) socket_->send(server_, receiver_.make_bye(clock_.now(), reason));
+  if (bound_) send_feedback(receiver_.make_bye(clock_.now(), reason));
   timer_.cancel();
   socket_->close();
+}
+
+void MediaClient::send_feedback(Datagram datagram) {
+  if (srtp_ && !srtp_->protect(datagram).ok()) return;  // never in clear text
+  socket_->send(server_, std::move(datagram));
+}
+
+// What is not right is counted by the receiver, or dropped by SRTP.
+void MediaClient::on_media(std::span<const uint8_t> datagram, DatagramKind kind) {
+  Datagram clear;
+  if (srtp_) {
+    StatusOr<Datagram> unprotected = srtp_->unprotect(datagram);
+    if (!unprotected.ok()) return;
+    clear = *std::move(unprotected);
+    datagram = clear;
+  }
+  const TimeNs now = clock_.now();
+  (void)(kind == DatagramKind::rtcp ? receiver_.on_rtcp(now, datagram) : receiver_.on_rtp(now, datagram));
 }
 
 void MediaClient::send_hello(TimeNs now) {
@@ -80,20 +101,9 @@ void MediaClient::on_datagram(const PeerAddress& from, std::span<const uint8_t> 
   {
     const std::lock_guard lock(mutex_);
     if (closed_) return;
-    const TimeNs now = clock_.now();
-    switch (classify(datagram)) {
-      case DatagramKind::hello_answer:
-        call = on_hello_answer(datagram);
-        break;
-      case DatagramKind::rtp:
-        (void)receiver_.on_rtp(now, datagram);
-        break;  // counted there
-      case DatagramKind::rtcp:
-        (void)receiver_.on_rtcp(now, datagram);
-        break;
-      default:
-        break;
-    }
+    const DatagramKind kind = classify(datagram);
+    if (kind == DatagramKind::hello_answer) call = on_hello_answer(datagram);
+    if (kind == DatagramKind::rtp || kind == DatagramKind::rtcp) on_media(datagram, kind);
   }
   if (call) call();
   step();
@@ -115,7 +125,7 @@ void MediaClient::step() {
           ": does a firewall block the port, is the token right, does the session still exist?"));
     } else {
       if (now >= next_hello_ns_) send_hello(now);
-      for (Datagram& datagram : receiver_.poll(now)) socket_->send(server_, std::move(datagram));
+      for (Datagram& datagram : receiver_.poll(now)) send_feedback(std::move(datagram));
       while (auto frame = receiver_.take_frame()) frames.push_back(*std::move(frame));
       schedule();
     }
@@ -145,9 +155,9 @@ void MediaClient::fail(Status status) {
   if (events_.on_failed) events_.on_failed(std::move(status));
 }
 
-void MediaClient::send_pose(const SequencedPose& pose) {
+bool MediaClient::send_pose(const SequencedPose& pose) {
   const std::lock_guard lock(mutex_);
-  if (bound_ && !closed_) socket_->send(server_, write_pose_datagram(pose));
+  return bound_ && !closed_ && !srtp_ && socket_->send(server_, write_pose_datagram(pose));
 }
 
 void MediaClient::request_key_frame() {

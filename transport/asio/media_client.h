@@ -11,8 +11,10 @@
 #include "base/time.h"
 #include "transport/asio/asio.h"
 #include "transport/asio/udp_socket.h"
+#include "transport/datagram.h"
 #include "transport/rtp_receiver.h"
 #include "transport/session_token.h"
+#include "transport/srtp.h"
 
 namespace tessera::transport {
 
@@ -22,6 +24,7 @@ struct MediaClientSettings {
   std::string bind_address;  // empty: any, of the server's family
   SessionToken token{};
   RtpReceiverSettings receiver;
+  std::optional<SrtpKeys> srtp;                     // of the welcome
   DurationNs hello_interval_ns = 200 * kNsPerMs;    // until the first answer
   DurationNs keep_alive_ns = 2 * kNsPerSecond;      // afterwards: measures the round trip, renews the binding
   DurationNs answer_timeout_ns = 8 * kNsPerSecond;  // without an answer: on_failed
@@ -43,7 +46,9 @@ class MediaClient : public std::enable_shared_from_this<MediaClient> {
   // Says BYE if it is bound.
   void close(const std::string& reason = "client closes");
 
-  void send_pose(const SequencedPose& pose);  // dropped before the client is bound
+  // False: not sent, because the client is not bound yet, or because of SRTP; then poses go over the meta
+  // connection.
+  bool send_pose(const SequencedPose& pose);
   void request_key_frame();
   RtpReceiverStats stats() const;
   std::optional<DurationNs> round_trip_ns() const;  // of the last answered hello
@@ -54,6 +59,8 @@ class MediaClient : public std::enable_shared_from_this<MediaClient> {
   void on_datagram(const PeerAddress& from, std::span<const uint8_t> datagram);
   std::function<void()> on_hello_answer(std::span<const uint8_t> datagram);
   void send_hello(TimeNs now);
+  void on_media(std::span<const uint8_t> datagram, DatagramKind kind);
+  void send_feedback(Datagram datagram);
   void step();
   void schedule();
   void fail(Status status);
@@ -66,6 +73,7 @@ class MediaClient : public std::enable_shared_from_this<MediaClient> {
   mutable std::mutex mutex_;  // of all below
   asio::steady_timer timer_;
   RtpReceiver receiver_;
+  std::unique_ptr<Srtp> srtp_;  // empty: clear text
   bool bound_ = false, closed_ = false;
   uint64_t nonce_ = 0;
   TimeNs hello_sent_ns_ = 0, next_hello_ns_ = 0, last_answer_ns_ = 0;

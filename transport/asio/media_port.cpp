@@ -33,11 +33,18 @@ void MediaPort::close() {
 }
 
 Status MediaPort::add_session(SessionId session, const SessionToken& token, std::unique_ptr<RtpSender> sender,
-                              MediaSessionEvents events) {
+                              MediaSessionEvents events, const std::optional<SrtpKeys>& srtp) {
+  std::unique_ptr<Srtp> protection;
+  if (srtp) {
+    TESSERA_ASSIGN_OR_RETURN(protection, Srtp::create(srtp->server, srtp->client));
+  }
   const std::lock_guard lock(mutex_);
   TESSERA_RETURN_IF_ERROR(binding_.add(session, token));
-  sessions_[session] = {
-      std::move(sender), std::make_shared<const MediaSessionEvents>(std::move(events)), {}, false};
+  sessions_[session] = {std::move(sender),
+                        std::make_shared<const MediaSessionEvents>(std::move(events)),
+                        {},
+                        false,
+                        std::move(protection)};
   return absl::OkStatus();
 }
 
@@ -46,7 +53,7 @@ void MediaPort::remove_session(SessionId session, const std::string& reason) {
   const auto found = sessions_.find(session);
   if (found == sessions_.end()) return;
   if (const auto address = binding_.address_of(session))
-    socket_->send(*address, found->second.sender->make_bye(clock_.now(), reason));
+    send(*address, found->second, found->second.sender->make_bye(clock_.now(), reason));
   binding_.remove(session);
   sessions_.erase(found);
 }
@@ -87,7 +94,7 @@ void MediaPort::handle(const RoutedDatagram& routed, std::span<const uint8_t> da
     pump(*routed.session, session);
   } else if (routed.kind == DatagramKind::pose) {
     const StatusOr<SequencedPose> pose = parse_pose_datagram(datagram);
-    if (!pose.ok()) return log_dropped();
+    if (!pose.ok() || session.srtp) return log_dropped();
     if (!session.newest_pose.accept(pose->sequence)) return;
     calls.push_back([events = session.events, pose = *pose] {
       if (events->on_pose) events->on_pose(pose);
@@ -96,6 +103,13 @@ void MediaPort::handle(const RoutedDatagram& routed, std::span<const uint8_t> da
 }
 
 void MediaPort::on_feedback(Session& session, std::span<const uint8_t> datagram, Calls& calls) {
+  Datagram clear;
+  if (session.srtp) {
+    StatusOr<Datagram> unprotected = session.srtp->unprotect(datagram);
+    if (!unprotected.ok()) return log_dropped();
+    clear = *std::move(unprotected);
+    datagram = clear;
+  }
   if (!session.sender->on_rtcp(clock_.now(), datagram).ok()) return log_dropped();
   if (session.sender->take_key_frame_request()) {
     calls.push_back([events = session.events] {
@@ -112,7 +126,12 @@ void MediaPort::on_feedback(Session& session, std::span<const uint8_t> datagram,
 void MediaPort::pump(SessionId id, Session& session) {
   const auto address = binding_.address_of(id);
   if (!address) return;
-  for (Datagram& datagram : session.sender->poll(clock_.now())) socket_->send(*address, std::move(datagram));
+  for (Datagram& datagram : session.sender->poll(clock_.now())) send(*address, session, std::move(datagram));
+}
+
+void MediaPort::send(const PeerAddress& to, Session& session, Datagram datagram) {
+  if (session.srtp && !session.srtp->protect(datagram).ok()) return;  // never in clear text
+  socket_->send(to, std::move(datagram));
 }
 
 // One timer for all sessions, at the earliest of their next events.

@@ -17,6 +17,7 @@
 #include "transport/asio/udp_socket.h"
 #include "transport/rtp_sender.h"
 #include "transport/session_binding.h"
+#include "transport/srtp.h"
 
 namespace tessera::transport {
 
@@ -37,9 +38,10 @@ class MediaPort : public std::enable_shared_from_this<MediaPort> {
   ~MediaPort();
   void close();
 
-  // AlreadyExists: the id or the token is in use.
+  // AlreadyExists: the id or the token is in use. With `srtp`, media and feedback are encrypted and
+  // authenticated, and poses by UDP, which are not, are refused.
   Status add_session(SessionId session, const SessionToken& token, std::unique_ptr<RtpSender> sender,
-                     MediaSessionEvents events);
+                     MediaSessionEvents events, const std::optional<SrtpKeys>& srtp = std::nullopt);
   // Says BYE to the client.
   void remove_session(SessionId session, const std::string& reason);
 
@@ -61,6 +63,7 @@ class MediaPort : public std::enable_shared_from_this<MediaPort> {
     std::shared_ptr<const MediaSessionEvents> events;
     NewestPose newest_pose;
     bool left = false;
+    std::unique_ptr<Srtp> srtp;  // empty: clear text
   };
   using Calls = std::vector<std::function<void()>>;
 
@@ -69,6 +72,7 @@ class MediaPort : public std::enable_shared_from_this<MediaPort> {
   void handle(const RoutedDatagram& routed, std::span<const uint8_t> datagram, Calls& calls);
   void on_feedback(Session& session, std::span<const uint8_t> datagram, Calls& calls);
   void log_dropped();
+  void send(const PeerAddress& to, Session& session, Datagram datagram);
   void pump(SessionId id, Session& session);
   void schedule();
   void on_timer();
