@@ -1,7 +1,7 @@
 # One folder = one library `tessera_<name>` = one namespace `tessera::<name>`. This table is the only place that
 # says which room may use which (docs/architecture.md); tessera_check_rooms() fails the configure step when a target
 # links outside its list, and tests/architecture checks the #include lines.
-set(TESSERA_ROOMS base gpu scene pvs atlas shading codec geometry-compression client-sdk server bench)
+set(TESSERA_ROOMS base gpu scene pvs atlas shading codec geometry-compression transport client-sdk server bench)
 set(TESSERA_MAY_USE_base "")
 set(TESSERA_MAY_USE_gpu base)
 set(TESSERA_MAY_USE_scene base gpu)
@@ -10,6 +10,7 @@ set(TESSERA_MAY_USE_atlas base gpu scene)
 set(TESSERA_MAY_USE_shading base gpu scene atlas)
 set(TESSERA_MAY_USE_codec base gpu)
 set(TESSERA_MAY_USE_geometry-compression "")
+set(TESSERA_MAY_USE_transport base)
 set(TESSERA_MAY_USE_client-sdk base codec geometry-compression)
 set(TESSERA_MAY_USE_server base gpu scene pvs atlas shading codec geometry-compression)
 set(TESSERA_MAY_USE_bench ${TESSERA_ROOMS})

@@ -1,0 +1,147 @@
+#include "transport/messages.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+
+#include "test_streams.h"
+
+namespace tessera::transport {
+namespace {
+
+using test::Bytes;
+using test::from_hex;
+
+Hello some_hello() {
+  Hello m;
+  m.token.fill(0xa5);
+  m.client = {1920, 1080, {-1.25f, 1.5f, -0.75f, 1}, 72, "viewer"};
+  return m;
+}
+
+Welcome some_welcome() {
+  Welcome m;
+  m.session = 3;
+  m.media_port = 5004;
+  m.stream = {0x11111111, 0x22222222, 96, 97, 0x3333};
+  m.atlas_width = 2048;
+  m.atlas_height = 1024;
+  m.frames_per_second = 30;
+  return m;
+}
+
+// The vectors of docs/protocol.md.
+constexpr const char* kHello =
+    "0001 a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5 0780 0438 bfa00000 3fc00000 bf400000 3f800000 42900000 0006 "
+    "766965776572";
+constexpr const char* kWelcome =
+    "0001 0000000000000003 138c 11111111 22222222 60 61 3333 0800 0400 41f00000 00";
+
+TEST(Messages, KnownBytes) {
+  EXPECT_EQ(encode(some_hello()), from_hex(kHello));
+  EXPECT_EQ(encode(some_welcome()), from_hex(kWelcome));
+  EXPECT_EQ(encode(ClockPing{1, 2}), from_hex("00000001 0000000000000002"));
+  EXPECT_EQ(encode(ClockPong{1, 2, 3, 4}),
+            from_hex("00000001 0000000000000002 0000000000000003 0000000000000004"));
+  EXPECT_EQ(encode(ErrorMessage{ErrorCode::bad_token, "abc"}), from_hex("0001 0003 616263"));
+  EXPECT_EQ(encode(ByeMessage{"abc"}), from_hex("0003 616263"));
+  const FrameTiming timing{7, 1, 2, 3, 4, 5, -6};
+  EXPECT_EQ(encode(std::span(&timing, 1)),
+            from_hex("0001 00000007 0000000000000001 0000000000000002 0000000000000003 0000000000000004"
+                     "0000000000000005 fffffffffffffffa"));
+}
+
+TEST(Messages, ComeBackAsTheyWere) {
+  const auto hello = decode_hello(encode(some_hello()));
+  ASSERT_TRUE(hello.ok()) << hello.status();
+  EXPECT_EQ(hello->token, some_hello().token);
+  EXPECT_EQ(hello->client.name, "viewer");
+  EXPECT_EQ(hello->client.fov.right, 1.5f);
+  EXPECT_EQ(hello->client.display_hz, 72);
+
+  Welcome with_keys = some_welcome();
+  with_keys.srtp.emplace().server.fill(1);
+  with_keys.srtp->client.fill(2);
+  for (const Welcome& m : {some_welcome(), with_keys}) {
+    const auto welcome = decode_welcome(encode(m));
+    ASSERT_TRUE(welcome.ok()) << welcome.status();
+    EXPECT_EQ(welcome->stream, m.stream);
+    EXPECT_EQ(welcome->srtp, m.srtp);
+    EXPECT_EQ(welcome->media_port, 5004);
+  }
+  const std::vector<FrameTiming> timings = {{1, 2, 3, 4, 5, 6, 7}, {8, 9, 10, 11, 12, 13, 14}};
+  EXPECT_EQ(*decode_timings(encode(timings)), timings);
+  EXPECT_EQ(*decode_ping(encode(ClockPing{9, -5})), (ClockPing{9, -5}));
+  EXPECT_EQ(*decode_pong(encode(ClockPong{9, 1, 2, 3})), (ClockPong{9, 1, 2, 3}));
+  EXPECT_EQ(decode_error(encode(ErrorMessage{ErrorCode::full, "x"}))->code, ErrorCode::full);
+  EXPECT_EQ(decode_bye(encode(ByeMessage{"why"}))->reason, "why");
+}
+
+TEST(Messages, EveryTruncationAndEveryExtraByteIsAnError) {
+  Welcome with_keys = some_welcome();
+  with_keys.srtp.emplace();
+  const std::vector<FrameTiming> timings(3);
+  const SequencedPose pose{1, {2, {}}};
+  const std::pair<Bytes, std::function<Status(const Bytes&)>> cases[] = {
+      {encode(some_hello()), [](const Bytes& b) { return decode_hello(b).status(); }},
+      {encode(some_welcome()), [](const Bytes& b) { return decode_welcome(b).status(); }},
+      {encode(with_keys), [](const Bytes& b) { return decode_welcome(b).status(); }},
+      {encode(pose), [](const Bytes& b) { return decode_pose(b).status(); }},
+      {encode(timings), [](const Bytes& b) { return decode_timings(b).status(); }},
+      {encode(ClockPing{}), [](const Bytes& b) { return decode_ping(b).status(); }},
+      {encode(ClockPong{}), [](const Bytes& b) { return decode_pong(b).status(); }},
+      {encode(ErrorMessage{}), [](const Bytes& b) { return decode_error(b).status(); }},
+      {encode(ByeMessage{"abc"}), [](const Bytes& b) { return decode_bye(b).status(); }},
+  };
+  for (const auto& [whole, decode] : cases) {
+    for (size_t n = 0; n < whole.size() + 3; ++n) {
+      Bytes bytes = whole;
+      bytes.resize(n);
+      EXPECT_EQ(decode(bytes).ok(), n == whole.size()) << n << " of " << whole.size();
+    }
+  }
+}
+
+TEST(Messages, ValuesOutsideTheirRangeAreRefused) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  using Change = void (*)(ClientSettings&);
+  for (Change change : std::initializer_list<Change>{
+           [](auto& c) { c.width = 0; }, [](auto& c) { c.height = 16385; }, [](auto& c) { c.fov.left = 2; },
+           [](auto& c) { c.fov.up = -1; }, [](auto& c) { c.fov.right = 61; },
+           [](auto& c) { c.display_hz = 0; }, [](auto& c) { c.display_hz = 1001; }}) {
+    Hello hello = some_hello();
+    change(hello.client);
+    EXPECT_EQ(decode_hello(encode(hello)).status().code(), absl::StatusCode::kInvalidArgument);
+  }
+  Hello hello = some_hello();
+  hello.client.fov.left = nan;
+  EXPECT_FALSE(decode_hello(encode(hello)).ok());
+  hello = some_hello();
+  hello.client.display_hz = nan;
+  EXPECT_FALSE(decode_hello(encode(hello)).ok());
+  Welcome welcome = some_welcome();
+  welcome.frames_per_second = nan;
+  EXPECT_FALSE(decode_welcome(encode(welcome)).ok());
+  EXPECT_FALSE(decode_timings(from_hex("0101")).ok());
+  Bytes long_name = encode(some_hello());
+  long_name.resize(long_name.size() - 8);
+  long_name.insert(long_name.end(), {0, 65});
+  long_name.resize(long_name.size() + 65, 'x');
+  EXPECT_FALSE(decode_hello(long_name).ok());
+}
+
+TEST(Messages, OtherVersionsAreNamed) {
+  Hello hello = some_hello();
+  hello.version = 7;
+  const Status status = decode_hello(encode(hello)).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kUnimplemented);
+  EXPECT_NE(status.message().find("version 7"), std::string::npos) << status;
+}
+
+TEST(Messages, LongTextsAreCut) {
+  EXPECT_EQ(decode_bye(encode(ByeMessage{std::string(5000, 'x')}))->reason.size(), kMaxReasonBytes);
+}
+
+}  // namespace
+}  // namespace tessera::transport

@@ -1,0 +1,248 @@
+#include "transport/messages.h"
+
+#include <algorithm>
+#include <string_view>
+
+#include "transport/byte_io.h"
+
+namespace tessera::transport {
+namespace {
+
+using Bytes = std::vector<uint8_t>;
+
+constexpr uint16_t kMaxSide = 16384;
+constexpr float kMaxTangent = 60;
+constexpr uint8_t kNoSrtp = 0, kSrtpAes128Sha1 = 1;
+
+Status malformed(const char* what) {
+  return absl::InvalidArgumentError(absl::StrCat(what, " message: wrong length, or a value out of range"));
+}
+
+Status other_version(const char* what, uint16_t version) {
+  return absl::UnimplementedError(absl::StrCat(what, " of protocol version ", version,
+                                               "; this end speaks version ", kProtocolVersion,
+                                               ": update the older end"));
+}
+
+void write_text(ByteWriter& w, std::string_view text, size_t limit) {
+  text = text.substr(0, limit);
+  w.u16(static_cast<uint16_t>(text.size()));
+  w.bytes({reinterpret_cast<const uint8_t*>(text.data()), text.size()});
+}
+
+std::string read_text(ByteReader& in, size_t limit) {
+  const size_t length = in.u16();
+  if (length > limit) in.fail();
+  const auto bytes = in.bytes(length);
+  return {bytes.begin(), bytes.end()};
+}
+
+template <size_t N>
+void read_array(ByteReader& in, std::array<uint8_t, N>& out) {
+  std::ranges::copy(in.bytes(N), out.begin());
+}
+
+void require(ByteReader& in, bool condition) {
+  if (!condition) in.fail();
+}
+
+bool in_range(const ClientSettings& c) {
+  const auto tangent = [](float t) { return t >= -kMaxTangent && t <= kMaxTangent; };
+  return c.width >= 1 && c.width <= kMaxSide && c.height >= 1 && c.height <= kMaxSide &&
+         tangent(c.fov.left) && tangent(c.fov.right) && tangent(c.fov.down) && tangent(c.fov.up) &&
+         c.fov.left < c.fov.right && c.fov.down < c.fov.up && c.display_hz >= 1 && c.display_hz <= 1000;
+}
+
+template <class T>
+StatusOr<T> finished(ByteReader& in, T message, const char* what) {
+  if (!in.done()) return malformed(what);
+  return message;
+}
+
+}  // namespace
+
+Bytes encode(const Hello& m) {
+  Bytes out;
+  ByteWriter w(out);
+  w.u16(m.version);
+  w.bytes(m.token);
+  w.u16(m.client.width);
+  w.u16(m.client.height);
+  for (float tangent : {m.client.fov.left, m.client.fov.right, m.client.fov.down, m.client.fov.up})
+    w.f32(tangent);
+  w.f32(m.client.display_hz);
+  write_text(w, m.client.name, kMaxNameBytes);
+  return out;
+}
+
+StatusOr<Hello> decode_hello(std::span<const uint8_t> payload) {
+  ByteReader in(payload);
+  Hello m;
+  m.version = in.u16();
+  if (in.ok() && m.version != kProtocolVersion) return other_version("hello", m.version);
+  read_array(in, m.token);
+  m.client.width = in.u16();
+  m.client.height = in.u16();
+  for (float* tangent : {&m.client.fov.left, &m.client.fov.right, &m.client.fov.down, &m.client.fov.up})
+    *tangent = in.f32();
+  m.client.display_hz = in.f32();
+  m.client.name = read_text(in, kMaxNameBytes);
+  require(in, in_range(m.client));
+  return finished(in, std::move(m), "hello");
+}
+
+Bytes encode(const Welcome& m) {
+  Bytes out;
+  ByteWriter w(out);
+  w.u16(m.version);
+  w.u64(m.session);
+  w.u16(m.media_port);
+  w.u32(m.stream.ssrc);
+  w.u32(m.stream.rtx_ssrc);
+  w.u8(m.stream.payload_type);
+  w.u8(m.stream.rtx_payload_type);
+  w.u16(m.stream.first_sequence);
+  w.u16(m.atlas_width);
+  w.u16(m.atlas_height);
+  w.f32(m.frames_per_second);
+  w.u8(m.srtp ? kSrtpAes128Sha1 : kNoSrtp);
+  if (m.srtp) {
+    w.bytes(m.srtp->server);
+    w.bytes(m.srtp->client);
+  }
+  return out;
+}
+
+StatusOr<Welcome> decode_welcome(std::span<const uint8_t> payload) {
+  ByteReader in(payload);
+  Welcome m;
+  m.version = in.u16();
+  if (in.ok() && m.version != kProtocolVersion) return other_version("welcome", m.version);
+  m.session = in.u64();
+  m.media_port = in.u16();
+  m.stream.ssrc = in.u32();
+  m.stream.rtx_ssrc = in.u32();
+  m.stream.payload_type = in.u8();
+  m.stream.rtx_payload_type = in.u8();
+  m.stream.first_sequence = in.u16();
+  m.atlas_width = in.u16();
+  m.atlas_height = in.u16();
+  m.frames_per_second = in.f32();
+  const uint8_t srtp = in.u8();
+  if (srtp == kSrtpAes128Sha1) {
+    read_array(in, m.srtp.emplace().server);
+    read_array(in, m.srtp->client);
+  }
+  require(in, srtp <= kSrtpAes128Sha1 && m.stream.payload_type < 128 && m.stream.rtx_payload_type < 128 &&
+                  m.frames_per_second > 0 && m.frames_per_second <= 1000);
+  return finished(in, m, "welcome");
+}
+
+Bytes encode(const SequencedPose& m) {
+  Bytes out;
+  ByteWriter w(out);
+  write_pose(m, w);
+  return out;
+}
+
+StatusOr<SequencedPose> decode_pose(std::span<const uint8_t> payload) {
+  ByteReader in(payload);
+  const SequencedPose pose = read_pose(in);
+  return finished(in, pose, "pose");
+}
+
+Bytes encode(std::span<const FrameTiming> timings) {
+  timings = timings.first(std::min(timings.size(), kMaxTimings));
+  Bytes out;
+  ByteWriter w(out);
+  w.u16(static_cast<uint16_t>(timings.size()));
+  for (const FrameTiming& t : timings) {
+    w.u32(t.frame);
+    for (TimeNs at : {t.atlas_first_packet, t.atlas_complete, t.meta_complete, t.atlas_decoded,
+                      t.meta_decoded, t.displayed})
+      w.i64(at);
+  }
+  return out;
+}
+
+StatusOr<std::vector<FrameTiming>> decode_timings(std::span<const uint8_t> payload) {
+  ByteReader in(payload);
+  const size_t count = in.u16();
+  require(in, count <= kMaxTimings);
+  std::vector<FrameTiming> timings(in.ok() ? count : 0);
+  for (FrameTiming& t : timings) {
+    t.frame = in.u32();
+    for (TimeNs* at : {&t.atlas_first_packet, &t.atlas_complete, &t.meta_complete, &t.atlas_decoded,
+                       &t.meta_decoded, &t.displayed})
+      *at = in.i64();
+  }
+  return finished(in, std::move(timings), "timing");
+}
+
+Bytes encode(const ClockPing& m) {
+  Bytes out;
+  ByteWriter w(out);
+  w.u32(m.id);
+  w.i64(m.client_sent);
+  return out;
+}
+
+StatusOr<ClockPing> decode_ping(std::span<const uint8_t> payload) {
+  ByteReader in(payload);
+  ClockPing m;
+  m.id = in.u32();
+  m.client_sent = in.i64();
+  return finished(in, m, "ping");
+}
+
+Bytes encode(const ClockPong& m) {
+  Bytes out;
+  ByteWriter w(out);
+  w.u32(m.id);
+  w.i64(m.client_sent);
+  w.i64(m.server_received);
+  w.i64(m.server_sent);
+  return out;
+}
+
+StatusOr<ClockPong> decode_pong(std::span<const uint8_t> payload) {
+  ByteReader in(payload);
+  ClockPong m;
+  m.id = in.u32();
+  m.client_sent = in.i64();
+  m.server_received = in.i64();
+  m.server_sent = in.i64();
+  return finished(in, m, "pong");
+}
+
+Bytes encode(const ErrorMessage& m) {
+  Bytes out;
+  ByteWriter w(out);
+  w.u16(static_cast<uint16_t>(m.code));
+  write_text(w, m.text, kMaxReasonBytes);
+  return out;
+}
+
+StatusOr<ErrorMessage> decode_error(std::span<const uint8_t> payload) {
+  ByteReader in(payload);
+  ErrorMessage m;
+  m.code = static_cast<ErrorCode>(in.u16());
+  m.text = read_text(in, kMaxReasonBytes);
+  return finished(in, std::move(m), "error");
+}
+
+Bytes encode(const ByeMessage& m) {
+  Bytes out;
+  ByteWriter w(out);
+  write_text(w, m.reason, kMaxReasonBytes);
+  return out;
+}
+
+StatusOr<ByeMessage> decode_bye(std::span<const uint8_t> payload) {
+  ByteReader in(payload);
+  ByeMessage m;
+  m.reason = read_text(in, kMaxReasonBytes);
+  return finished(in, std::move(m), "bye");
+}
+
+}  // namespace tessera::transport

@@ -1,0 +1,37 @@
+// A pose on the wire: the same 52 bytes in a datagram and in a TCP frame (docs/protocol.md).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "base/view.h"
+#include "transport/byte_io.h"
+
+namespace tessera::transport {
+
+struct SequencedPose {
+  uint32_t sequence = 0;  // counts poses on both ways together; wraps around
+  TimedPose timed;        // time on the client's clock
+};
+
+constexpr double kMaxPositionM = 1e9;
+
+void write_pose(const SequencedPose& pose, ByteWriter& out);
+// Latches the reader's error for a value that is not finite, a position beyond ±kMaxPositionM, or a
+// quaternion whose length is not within 0.5..2. The result has unit length.
+SequencedPose read_pose(ByteReader& in);
+
+// Newest wins: whether a pose is newer than all before it (serial numbers, RFC 1982).
+class NewestPose {
+ public:
+  bool accept(uint32_t sequence) {
+    if (newest_ && static_cast<int32_t>(sequence - *newest_) <= 0) return false;
+    newest_ = sequence;
+    return true;
+  }
+
+ private:
+  std::optional<uint32_t> newest_;
+};
+
+}  // namespace tessera::transport
