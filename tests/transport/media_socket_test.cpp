@@ -195,6 +195,18 @@ TEST_F(MediaSockets, ANewAddressTakesOver) {
   EXPECT_EQ(port->binding_stats().rebound, 1u);
 }
 
+TEST_F(MediaSockets, PosesOfTheNextClientCountFromTheStart) {
+  std::vector<uint32_t> poses;
+  const StreamIds ids =
+      add_session(1, {.on_pose = [&](const SequencedPose& p) { poses.push_back(p.sequence); }});
+  for (const uint32_t sequence : {1000u, 0u}) {
+    const auto client = connect(settings_of(1, ids), {});
+    ASSERT_TRUE(run_until([&] { return client->send_pose({sequence, {}}); }));
+    ASSERT_TRUE(run_until([&] { return !poses.empty() && poses.back() == sequence; })) << sequence;
+    client->close();
+  }
+}
+
 TEST_F(MediaSockets, SrtpCarriesMediaAndFeedback) {
   SrtpKeys keys, wrong;
   keys.server.fill(1);

@@ -86,6 +86,7 @@ void MediaPort::log_dropped() {
 void MediaPort::handle(const RoutedDatagram& routed, std::span<const uint8_t> datagram, Calls& calls) {
   Session& session = sessions_.at(*routed.session);
   if (routed.kind == DatagramKind::hello && routed.address_changed) {
+    session.newest_pose = {};  // it may be another client, which counts from the start
     calls.push_back([events = session.events] {
       if (events->on_bound) events->on_bound();
     });

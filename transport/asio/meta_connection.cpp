@@ -183,8 +183,11 @@ std::vector<uint8_t> MetaConnection::last_frame(const Status& reason) {
 void MetaConnection::begin_close(Status reason) {
   const std::lock_guard lock(mutex_);
   if (closed_ || closing_) return;
+  const bool was_writing = writing_;
   enqueue(last_frame(reason));
   closing_ = std::move(reason);
+  settings_.stall_timeout_ns = std::min(settings_.stall_timeout_ns, settings_.close_timeout_ns);
+  if (was_writing) watch_stall();
 }
 
 void MetaConnection::close(Status reason) {

@@ -1,0 +1,273 @@
+#include "server/stream_server.h"
+
+#include <openssl/rand.h>
+
+#include <algorithm>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <condition_variable>
+#include <map>
+#include <thread>
+#include <utility>
+
+#include "base/log.h"
+#include "transport/asio/endpoint.h"
+
+namespace tessera::server {
+namespace {
+
+namespace asio = transport::asio;
+using transport::SessionId;
+using transport::SessionToken;
+
+Status check_exposure(const StreamServerSettings& settings) {
+  TESSERA_ASSIGN_OR_RETURN(const asio::ip::address media, transport::parse_address(settings.media.address));
+  TESSERA_ASSIGN_OR_RETURN(const asio::ip::address meta, transport::parse_address(settings.meta.address));
+  if (settings.insecure || (media.is_loopback() && meta.is_loopback())) return absl::OkStatus();
+  if (settings.meta.tls) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "binding ", settings.meta.address, " and ", settings.media.address,
+      " would send tokens and pictures in clear text: give a TLS certificate, or say --insecure"));
+}
+
+StatusOr<uint64_t> random_bytes(std::span<uint8_t> out) {
+  if (RAND_bytes(out.data(), static_cast<int>(out.size())) != 1)
+    return absl::InternalError("RAND_bytes: no random numbers to be had");
+  return out.size();
+}
+
+struct Entry {
+  SessionToken token;
+  transport::StreamIds ids;
+  std::optional<transport::SrtpKeys> srtp;
+  std::shared_ptr<StreamedSession> session;
+};
+
+}  // namespace
+
+struct StreamServer::Impl {
+  Impl(const StreamServerSettings& s, const Clock& c) : settings(s), clock(c), work(io.get_executor()) {}
+
+  Status open();
+  void run_renderer();
+  std::shared_ptr<StreamedSession> next_ready(std::unique_lock<std::mutex>& lock);
+  void wake();
+  StatusOr<transport::Admission> admit(const transport::Hello& hello, const std::string& peer);
+  transport::MediaSessionEvents media_events(const std::shared_ptr<StreamedSession>& session);
+  std::shared_ptr<StreamedSession> take(SessionId id);
+  Status end(SessionId id, const Status& reason);
+
+  const StreamServerSettings settings;
+  const Clock& clock;
+  asio::io_context io;
+  asio::executor_work_guard<asio::io_context::executor_type> work;
+  std::shared_ptr<transport::MediaPort> media;
+  std::shared_ptr<transport::MetaListener> meta;
+
+  mutable std::mutex mutex;  // of all below
+  std::condition_variable changed;
+  std::map<SessionId, Entry> sessions;
+  SessionId next_id = 1;
+  bool stopping = false, woken = false;
+  std::thread io_thread, render_thread;
+};
+
+Status StreamServer::Impl::open() {
+  TESSERA_RETURN_IF_ERROR(check_exposure(settings));
+  TESSERA_ASSIGN_OR_RETURN(media, transport::MediaPort::open(asio::make_strand(io), settings.media, clock));
+  TESSERA_ASSIGN_OR_RETURN(
+      meta, transport::MetaListener::open(io.get_executor(), settings.meta,
+                                          [this](const transport::Hello& hello, const std::string& peer) {
+                                            return admit(hello, peer);
+                                          }));
+  io_thread = std::thread([this] { io.run(); });
+  render_thread = std::thread([this] { run_renderer(); });
+  return absl::OkStatus();
+}
+
+void StreamServer::Impl::wake() {
+  {
+    const std::lock_guard lock(mutex);
+    woken = true;
+  }
+  changed.notify_one();
+}
+
+// Earliest deadline first: under overload all sessions fall behind evenly. Null when the server stops.
+std::shared_ptr<StreamedSession> StreamServer::Impl::next_ready(std::unique_lock<std::mutex>& lock) {
+  while (!stopping) {
+    std::shared_ptr<StreamedSession> earliest;
+    for (const auto& [id, entry] : sessions) {
+      if (entry.session->ready() && (!earliest || entry.session->due_ns() < earliest->due_ns()))
+        earliest = entry.session;
+    }
+    const DurationNs wait = earliest ? earliest->due_ns() - clock.now() : kNsPerSecond;
+    if (earliest && wait <= 0) return earliest;
+    woken = false;
+    changed.wait_for(lock, std::chrono::nanoseconds(wait), [this] { return stopping || woken; });
+  }
+  return nullptr;
+}
+
+void StreamServer::Impl::run_renderer() {
+  std::unique_lock lock(mutex);
+  while (const std::shared_ptr<StreamedSession> session = next_ready(lock)) {
+    lock.unlock();
+    if (const Status status = session->render(); !status.ok()) {
+      spdlog::error("session {}: {}", session->id(), status.ToString());
+      (void)end(session->id(), status);
+    }
+    lock.lock();
+  }
+}
+
+transport::MediaSessionEvents StreamServer::Impl::media_events(
+    const std::shared_ptr<StreamedSession>& session) {
+  const std::weak_ptr<StreamedSession> weak = session;
+  const auto with = [this, weak](auto action) {
+    if (const auto held = weak.lock()) action(*held), wake();
+  };
+  return {.on_bound = [with] { with([](StreamedSession& s) { s.on_bound(); }); },
+          .on_pose =
+              [with](const transport::SequencedPose& p) { with([&](StreamedSession& s) { s.on_pose(p); }); },
+          .on_key_frame_request = [with] { with([](StreamedSession& s) { s.on_key_frame_request(); }); },
+          .on_left = {}};
+}
+
+StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello& hello,
+                                                         const std::string& peer) {
+  std::unique_lock lock(mutex);
+  const Entry* found = nullptr;
+  for (const auto& [id, entry] : sessions)
+    if (transport::equal_in_constant_time(entry.token, hello.token)) found = &entry;
+  if (!found) return absl::UnauthenticatedError("no session has this token; create one and use its token");
+  const Entry entry = *found;
+  lock.unlock();
+
+  const std::shared_ptr<StreamedSession> session = entry.session;
+  TESSERA_RETURN_IF_ERROR(session->admit(hello.client));
+  spdlog::info("session {}: {} connected from {}", session->id(), hello.client.name, peer);
+  const SessionSettings& s = session->settings();
+  return transport::Admission{
+      .welcome = {.session = session->id(),
+                  .media_port = media->port(),
+                  .stream = entry.ids,
+                  .atlas_width = static_cast<uint16_t>(s.layout.width),
+                  .atlas_height = static_cast<uint16_t>(s.layout.height),
+                  .frames_per_second = static_cast<float>(s.rate.frames_per_second),
+                  .srtp = entry.srtp},
+      .events = {.on_frame =
+                     [this, session](transport::FrameType type, std::span<const uint8_t> payload) {
+                       const Status status = session->on_frame(type, payload);
+                       wake();
+                       return status;
+                     },
+                 .on_closed =
+                     [session](const Status& reason) {
+                       spdlog::info("session {}: client left: {}", session->id(), reason.ToString());
+                       session->on_closed(reason);
+                     }},
+      .on_connected = [this, session](std::shared_ptr<transport::MetaConnection> connection) {
+        session->on_connected(std::move(connection));
+        wake();
+      }};
+}
+
+std::shared_ptr<StreamedSession> StreamServer::Impl::take(SessionId id) {
+  const std::lock_guard lock(mutex);
+  const auto found = sessions.find(id);
+  if (found == sessions.end()) return nullptr;
+  std::shared_ptr<StreamedSession> session = std::move(found->second.session);
+  sessions.erase(found);
+  return session;
+}
+
+Status StreamServer::Impl::end(SessionId id, const Status& reason) {
+  const std::shared_ptr<StreamedSession> session = take(id);
+  if (!session) return absl::NotFoundError(absl::StrCat("there is no session ", id));
+  session->close(reason);
+  media->remove_session(id, std::string(reason.message()));
+  return absl::OkStatus();
+}
+
+StreamServer::StreamServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+StatusOr<std::unique_ptr<StreamServer>> StreamServer::create(const StreamServerSettings& settings,
+                                                             const Clock& clock) {
+  std::unique_ptr<StreamServer> server(new StreamServer(std::make_unique<Impl>(settings, clock)));
+  TESSERA_RETURN_IF_ERROR(server->impl_->open());
+  return server;
+}
+
+StreamServer::~StreamServer() {
+  Impl& s = *impl_;
+  std::vector<SessionId> open;
+  {
+    const std::lock_guard lock(s.mutex);
+    s.stopping = true;
+    for (const auto& [id, entry] : s.sessions) open.push_back(id);
+  }
+  s.changed.notify_all();
+  if (s.render_thread.joinable()) s.render_thread.join();
+  for (const SessionId id : open) (void)s.end(id, absl::OkStatus());
+  if (s.meta) s.meta->close();
+  if (s.media) s.media->close();
+  s.work.reset();  // what is queued still goes out, within close_timeout_ns
+  if (s.io_thread.joinable()) s.io_thread.join();
+}
+
+StatusOr<SessionTicket> StreamServer::create_session(std::shared_ptr<SharedScene> scene,
+                                                     const SessionSettings& settings) {
+  Impl& s = *impl_;
+  SessionTicket ticket{.media_port = media_port(), .meta_port = meta_port()};
+  std::array<uint8_t, 8> seed{};
+  TESSERA_RETURN_IF_ERROR(random_bytes(ticket.token).status());
+  TESSERA_RETURN_IF_ERROR(random_bytes(seed).status());
+  transport::RtpSenderSettings rtp{.pacer = {.rate_bps = settings.rate.bitrate_bps}};
+  std::copy(seed.begin(), seed.end(), reinterpret_cast<uint8_t*>(&rtp.seed));
+  TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<transport::RtpSender> sender, transport::RtpSender::create(rtp));
+  Entry entry{.token = ticket.token, .ids = sender->ids()};
+  if (s.settings.meta.tls) {
+    entry.srtp.emplace();
+    TESSERA_RETURN_IF_ERROR(random_bytes(entry.srtp->server).status());
+    TESSERA_RETURN_IF_ERROR(random_bytes(entry.srtp->client).status());
+  }
+
+  const std::lock_guard lock(s.mutex);
+  if (s.sessions.size() >= s.settings.max_sessions) {
+    return absl::ResourceExhaustedError(absl::StrCat("all ", s.settings.max_sessions,
+                                                     " sessions are taken; end one or raise --max-sessions"));
+  }
+  ticket.session = s.next_id++;
+  entry.session =
+      std::make_shared<StreamedSession>(ticket.session, std::move(scene), settings, s.media, s.clock);
+  TESSERA_RETURN_IF_ERROR(s.media->add_session(ticket.session, ticket.token, std::move(sender),
+                                               s.media_events(entry.session), entry.srtp));
+  s.sessions.emplace(ticket.session, std::move(entry));
+  return ticket;
+}
+
+Status StreamServer::end_session(SessionId session, const std::string& reason) {
+  return impl_->end(session, reason.empty() ? absl::OkStatus() : absl::CancelledError(reason));
+}
+
+StatusOr<StreamedSessionStats> StreamServer::stats(SessionId session) const {
+  const std::lock_guard lock(impl_->mutex);
+  const auto found = impl_->sessions.find(session);
+  if (found == impl_->sessions.end())
+    return absl::NotFoundError(absl::StrCat("there is no session ", session));
+  return found->second.session->stats();
+}
+
+size_t StreamServer::sessions() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->sessions.size();
+}
+uint16_t StreamServer::media_port() const {
+  return impl_->media->port();
+}
+uint16_t StreamServer::meta_port() const {
+  return impl_->meta->port();
+}
+
+}  // namespace tessera::server

@@ -1,0 +1,85 @@
+// One client of a StreamServer: what its connections bring in, and the frames that go out to it.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/session.h"
+#include "transport/asio/media_port.h"
+#include "transport/asio/meta_connection.h"
+
+namespace tessera::server {
+
+struct StreamedSessionStats {
+  uint64_t frames_sent = 0;
+  uint64_t frames_skipped = 0;   // periods given up: the network still held the frame before
+  DurationNs round_trip_ns = 0;  // from a pose to the picture that shows its frame, as the client reports it
+  Status ended;                  // why the client left, or OK
+};
+
+// The network's threads call on_*; the render thread calls ready(), due_ns() and render(). Thread-safe.
+class StreamedSession {
+ public:
+  // `settings.client_view` is replaced by what the client's hello says.
+  StreamedSession(transport::SessionId id, std::shared_ptr<SharedScene> scene,
+                  const SessionSettings& settings, std::shared_ptr<transport::MediaPort> media,
+                  const Clock& clock);
+
+  void on_connected(std::shared_ptr<transport::MetaConnection> connection);
+  void on_closed(const Status& reason);
+  void on_bound();
+  void on_pose(const transport::SequencedPose& pose);
+  void on_key_frame_request();
+  Status on_frame(transport::FrameType type, std::span<const uint8_t> payload);
+  // FailedPrecondition: a client is connected already.
+  Status admit(const transport::ClientSettings& client);
+  // Tells the client; it sends nothing any more.
+  void close(const Status& reason);
+
+  // Both connections stand and a pose is there.
+  bool ready() const;
+  // When its next frame should start, on the server's clock.
+  TimeNs due_ns() const;
+  // Renders and sends a frame, or skips it while the network is behind. An error ends the session.
+  Status render();
+  StreamedSessionStats stats() const;
+  const SessionSettings& settings() const { return settings_; }
+  transport::SessionId id() const { return id_; }
+
+ private:
+  struct Work {  // what the render thread takes along
+    std::vector<TimedPose> poses;
+    std::shared_ptr<transport::MetaConnection> connection;
+    View client_view;
+    DurationNs round_trip_ns = 0;
+    bool key_frame = false;
+  };
+  Status on_timing(std::span<const uint8_t> payload);
+  Status answer_ping(std::span<const uint8_t> payload);
+  Work take_work();
+  void put_off(bool sent, FrameNumber number, TimeNs pose_ns);
+  DurationNs period_ns() const { return from_seconds(1.0 / settings_.rate.frames_per_second); }
+
+  const transport::SessionId id_;
+  const std::shared_ptr<SharedScene> scene_;
+  const std::shared_ptr<transport::MediaPort> media_;
+  const Clock& clock_;
+  const SessionSettings settings_;
+  std::unique_ptr<Session> session_;  // the render thread's
+  FrameNumber next_frame_ = 1;        // likewise
+
+  mutable std::mutex mutex_;  // of all below
+  std::shared_ptr<transport::MetaConnection> connection_;
+  View client_view_;
+  std::vector<TimedPose> poses_;  // on the client's clock
+  std::map<FrameNumber, TimeNs> pose_of_frame_;
+  bool admitted_ = false, bound_ = false, key_frame_wanted_ = false, restart_ = false;
+  TimeNs due_ns_ = 0;
+  StreamedSessionStats stats_;
+};
+
+}  // namespace tessera::server
