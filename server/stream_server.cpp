@@ -6,6 +6,8 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <condition_variable>
+#include <deque>
+#include <future>
 #include <map>
 #include <thread>
 #include <utility>
@@ -51,6 +53,7 @@ struct StreamServer::Impl {
   Status open();
   void run_renderer();
   std::shared_ptr<StreamedSession> next_ready(std::unique_lock<std::mutex>& lock);
+  void do_device_work(std::unique_lock<std::mutex>& lock);
   void wake();
   StatusOr<transport::Admission> admit(const transport::Hello& hello, const std::string& peer);
   transport::MediaSessionEvents media_events(const std::shared_ptr<StreamedSession>& session);
@@ -68,6 +71,9 @@ struct StreamServer::Impl {
   std::condition_variable changed;
   std::map<SessionId, Entry> sessions;
   SessionId next_id = 1;
+  std::vector<std::shared_ptr<StreamedSession>>
+      ended;  // whose device objects the render thread has to release
+  std::deque<std::packaged_task<Status()>> device_work;
   bool stopping = false, woken = false;
   std::thread io_thread, render_thread;
 };
@@ -93,9 +99,21 @@ void StreamServer::Impl::wake() {
   changed.notify_one();
 }
 
+void StreamServer::Impl::do_device_work(std::unique_lock<std::mutex>& lock) {
+  while (!ended.empty() || !device_work.empty()) {
+    const auto released = std::exchange(ended, {});
+    auto tasks = std::exchange(device_work, {});
+    lock.unlock();
+    for (const auto& session : released) session->release();
+    for (auto& task : tasks) task();
+    lock.lock();
+  }
+}
+
 // Earliest deadline first: under overload all sessions fall behind evenly. Null when the server stops.
 std::shared_ptr<StreamedSession> StreamServer::Impl::next_ready(std::unique_lock<std::mutex>& lock) {
   while (!stopping) {
+    do_device_work(lock);
     std::shared_ptr<StreamedSession> earliest;
     for (const auto& [id, entry] : sessions) {
       if (entry.session->ready() && (!earliest || entry.session->due_ns() < earliest->due_ns()))
@@ -187,6 +205,12 @@ Status StreamServer::Impl::end(SessionId id, const Status& reason) {
   if (!session) return absl::NotFoundError(absl::StrCat("there is no session ", id));
   session->close(reason);
   media->remove_session(id, std::string(reason.message()));
+  {
+    const std::lock_guard lock(mutex);
+    ended.push_back(session);
+    woken = true;
+  }
+  changed.notify_one();
   return absl::OkStatus();
 }
 
@@ -214,6 +238,9 @@ StreamServer::~StreamServer() {
   if (s.media) s.media->close();
   s.work.reset();  // what is queued still goes out, within close_timeout_ns
   if (s.io_thread.joinable()) s.io_thread.join();
+  // The render thread is no more: the device is this thread's now.
+  std::unique_lock lock(s.mutex);
+  s.do_device_work(lock);
 }
 
 StatusOr<SessionTicket> StreamServer::create_session(std::shared_ptr<SharedScene> scene,
@@ -263,6 +290,19 @@ size_t StreamServer::sessions() const {
   const std::lock_guard lock(impl_->mutex);
   return impl_->sessions.size();
 }
+Status StreamServer::run_on_device(const std::function<Status()>& work) {
+  std::packaged_task<Status()> task(work);
+  std::future<Status> result = task.get_future();
+  {
+    const std::lock_guard lock(impl_->mutex);
+    if (impl_->stopping) return absl::CancelledError("the server stops");
+    impl_->device_work.push_back(std::move(task));
+    impl_->woken = true;
+  }
+  impl_->changed.notify_one();
+  return result.get();
+}
+
 uint16_t StreamServer::media_port() const {
   return impl_->media->port();
 }

@@ -2,6 +2,7 @@
 // Control (who may have a session, of which scene) lies above.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -45,6 +46,10 @@ class StreamServer {
   Status end_session(transport::SessionId session, const std::string& reason);
   StatusOr<StreamedSessionStats> stats(transport::SessionId session) const;
   size_t sessions() const;
+
+  // Runs `work` on the render thread, between two frames, and waits for it: a device belongs to one thread.
+  // Whatever of a scene lies on the device is made and destroyed this way. Cancelled: the server stops.
+  Status run_on_device(const std::function<Status()>& work);
 
   uint16_t media_port() const;
   uint16_t meta_port() const;

@@ -18,7 +18,7 @@ constexpr size_t kMaxFramesInFlight = 256;
 StreamedSession::StreamedSession(transport::SessionId id, std::shared_ptr<SharedScene> scene,
                                  const SessionSettings& settings, std::shared_ptr<transport::MediaPort> media,
                                  const Clock& clock)
-    : id_(id), scene_(std::move(scene)), media_(std::move(media)), clock_(clock), settings_(settings) {
+    : id_(id), media_(std::move(media)), clock_(clock), settings_(settings), scene_(std::move(scene)) {
   stats_.round_trip_ns = kFirstRoundTripNs;
 }
 
@@ -177,6 +177,11 @@ Status StreamedSession::render() {
     return absl::OkStatus();
   }
   return sent.status();
+}
+
+void StreamedSession::release() {
+  session_.reset();
+  scene_.reset();
 }
 
 StreamedSessionStats StreamedSession::stats() const {

@@ -21,7 +21,8 @@ struct StreamedSessionStats {
   Status ended;                  // why the client left, or OK
 };
 
-// The network's threads call on_*; the render thread calls ready(), due_ns() and render(). Thread-safe.
+// The network's threads call on_*; the render thread calls ready(), due_ns(), render() and release().
+// Thread-safe.
 class StreamedSession {
  public:
   // `settings.client_view` is replaced by what the client's hello says.
@@ -46,6 +47,8 @@ class StreamedSession {
   TimeNs due_ns() const;
   // Renders and sends a frame, or skips it while the network is behind. An error ends the session.
   Status render();
+  // Lets go of all that lies on the device; nothing is rendered afterwards.
+  void release();
   StreamedSessionStats stats() const;
   const SessionSettings& settings() const { return settings_; }
   transport::SessionId id() const { return id_; }
@@ -65,12 +68,12 @@ class StreamedSession {
   DurationNs period_ns() const { return from_seconds(1.0 / settings_.rate.frames_per_second); }
 
   const transport::SessionId id_;
-  const std::shared_ptr<SharedScene> scene_;
   const std::shared_ptr<transport::MediaPort> media_;
   const Clock& clock_;
   const SessionSettings settings_;
-  std::unique_ptr<Session> session_;  // the render thread's
-  FrameNumber next_frame_ = 1;        // likewise
+  std::shared_ptr<SharedScene> scene_;  // the render thread's, with all of the device
+  std::unique_ptr<Session> session_;    // likewise
+  FrameNumber next_frame_ = 1;          // likewise
 
   mutable std::mutex mutex_;  // of all below
   std::shared_ptr<transport::MetaConnection> connection_;

@@ -24,11 +24,15 @@ class StreamServerTest : public Test {
     ASSERT_TRUE(device.ok()) << device.status();
     auto loaded = scene::load_scene("gallery:0");
     ASSERT_TRUE(loaded.ok()) << loaded.status();
+    device_ = *device;
     auto shared = SharedScene::create(*device, *loaded);
     ASSERT_TRUE(shared.ok()) << shared.status();
     scene_ = *shared;
   }
-  static void TearDownTestSuite() { scene_.reset(); }
+  static void TearDownTestSuite() {
+    scene_.reset();
+    device_.reset();
+  }
 
   void start(const StreamServerSettings& settings = {}) {
     auto server = StreamServer::create(settings, clock_);
@@ -91,9 +95,11 @@ class StreamServerTest : public Test {
 
   SteadyClock clock_;
   std::unique_ptr<StreamServer> server_;
+  static std::shared_ptr<gpu::Device> device_;
   static std::shared_ptr<SharedScene> scene_;
 };
 
+std::shared_ptr<gpu::Device> StreamServerTest::device_;
 std::shared_ptr<SharedScene> StreamServerTest::scene_;
 
 TEST_F(StreamServerTest, TwoClientsSeeNewerAndNewerPairs) {
@@ -174,6 +180,34 @@ TEST_F(StreamServerTest, AnEndedSessionTellsItsClientWhy) {
       << (*client)->status();
   EXPECT_EQ(server_->sessions(), 0u);
   EXPECT_TRUE(absl::IsNotFound(server_->end_session(a.session, "")));
+}
+
+// What lies on the device is made and destroyed by the render thread alone.
+TEST_F(StreamServerTest, ScenesComeAndGoWhileSessionsRun) {
+  start();
+  auto client = connect(ticket());
+  ASSERT_TRUE(client.ok()) << client.status();
+  for (int i = 0; i < 3; ++i) {
+    std::shared_ptr<SharedScene> other;
+    const Status loaded = server_->run_on_device([&]() -> Status {
+      TESSERA_ASSIGN_OR_RETURN(const auto scene, scene::load_scene("city:1000"));
+      TESSERA_ASSIGN_OR_RETURN(other, SharedScene::create(device_, scene));
+      return absl::OkStatus();
+    });
+    ASSERT_TRUE(loaded.ok()) << loaded;
+    const std::weak_ptr<SharedScene> watched = other;
+    const auto session = server_->create_session(std::exchange(other, nullptr), small());
+    ASSERT_TRUE(session.ok()) << session.status();
+    auto visitor = connect(*session);
+    ASSERT_TRUE(visitor.ok()) << visitor.status();
+    expect_pairs(**visitor, 2);
+    EXPECT_TRUE(server_->end_session(session->session, "").ok());
+    // Behind the release, in the same thread.
+    EXPECT_TRUE(server_->run_on_device([&] { return absl::OkStatus(); }).ok());
+    EXPECT_TRUE(watched.expired());
+    expect_pairs(**client, 2);
+  }
+  EXPECT_TRUE(absl::IsUnknown(server_->run_on_device([] { return absl::UnknownError("as it is"); })));
 }
 
 TEST_F(StreamServerTest, SessionsAreLimited) {
