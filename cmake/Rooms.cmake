@@ -1,8 +1,9 @@
 # One folder = one library `tessera_<name>` = one namespace `tessera::<name>`. This table is the only place that
 # says which room may use which (docs/architecture.md); tessera_check_rooms() fails the configure step when a target
 # links outside its list, and tests/architecture checks the #include lines.
-set(TESSERA_ROOMS base gpu scene pvs atlas shading codec geometry-compression transport client-sdk server bench)
+set(TESSERA_ROOMS base proto gpu scene pvs atlas shading codec geometry-compression transport client-sdk server bench)
 set(TESSERA_MAY_USE_base "")
+set(TESSERA_MAY_USE_proto base)
 set(TESSERA_MAY_USE_gpu base)
 set(TESSERA_MAY_USE_scene base gpu)
 set(TESSERA_MAY_USE_pvs base gpu scene)
@@ -12,7 +13,7 @@ set(TESSERA_MAY_USE_codec base gpu)
 set(TESSERA_MAY_USE_geometry-compression "")
 set(TESSERA_MAY_USE_transport base)
 set(TESSERA_MAY_USE_client-sdk base codec geometry-compression transport)
-set(TESSERA_MAY_USE_server base gpu scene pvs atlas shading codec geometry-compression transport)
+set(TESSERA_MAY_USE_server base gpu scene pvs atlas shading codec geometry-compression transport proto)
 set(TESSERA_MAY_USE_bench ${TESSERA_ROOMS})
 
 function(tessera_room_target room out)

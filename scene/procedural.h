@@ -24,6 +24,7 @@ CameraPath city_path();
 
 // `spec` is a glTF file's path, or `gallery[:detail]`, or `city[:triangles]`.
 StatusOr<std::shared_ptr<Scene>> load_scene(const std::string& spec);
+bool is_procedural(const std::string& spec);  // not a file
 // `spec` is a CSV file's path, or `gallery`, or `city`.
 StatusOr<CameraPath> load_path(const std::string& spec);
 

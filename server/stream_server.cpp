@@ -225,15 +225,13 @@ StatusOr<std::unique_ptr<StreamServer>> StreamServer::create(const StreamServerS
 
 StreamServer::~StreamServer() {
   Impl& s = *impl_;
-  std::vector<SessionId> open;
   {
     const std::lock_guard lock(s.mutex);
     s.stopping = true;
-    for (const auto& [id, entry] : s.sessions) open.push_back(id);
   }
   s.changed.notify_all();
   if (s.render_thread.joinable()) s.render_thread.join();
-  for (const SessionId id : open) (void)s.end(id, absl::OkStatus());
+  end_all("");
   if (s.meta) s.meta->close();
   if (s.media) s.media->close();
   s.work.reset();  // what is queued still goes out, within close_timeout_ns
@@ -276,6 +274,15 @@ StatusOr<SessionTicket> StreamServer::create_session(std::shared_ptr<SharedScene
 
 Status StreamServer::end_session(SessionId session, const std::string& reason) {
   return impl_->end(session, reason.empty() ? absl::OkStatus() : absl::CancelledError(reason));
+}
+
+void StreamServer::end_all(const std::string& reason) {
+  std::vector<SessionId> open;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    for (const auto& [id, entry] : impl_->sessions) open.push_back(id);
+  }
+  for (const SessionId id : open) (void)end_session(id, reason);
 }
 
 StatusOr<StreamedSessionStats> StreamServer::stats(SessionId session) const {

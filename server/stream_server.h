@@ -44,6 +44,7 @@ class StreamServer {
   StatusOr<SessionTicket> create_session(std::shared_ptr<SharedScene> scene, const SessionSettings& settings);
   // NotFound.
   Status end_session(transport::SessionId session, const std::string& reason);
+  void end_all(const std::string& reason);
   StatusOr<StreamedSessionStats> stats(transport::SessionId session) const;
   size_t sessions() const;
 

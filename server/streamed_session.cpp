@@ -186,7 +186,9 @@ void StreamedSession::release() {
 
 StreamedSessionStats StreamedSession::stats() const {
   const std::lock_guard lock(mutex_);
-  return stats_;
+  StreamedSessionStats stats = stats_;
+  stats.connected = connection_ != nullptr;
+  return stats;
 }
 
 }  // namespace tessera::server

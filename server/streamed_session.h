@@ -15,6 +15,7 @@
 namespace tessera::server {
 
 struct StreamedSessionStats {
+  bool connected = false;
   uint64_t frames_sent = 0;
   uint64_t frames_skipped = 0;   // periods given up: the network still held the frame before
   DurationNs round_trip_ns = 0;  // from a pose to the picture that shows its frame, as the client reports it

@@ -29,6 +29,10 @@ StatusOr<uint64_t> argument(const std::string& spec, uint64_t otherwise, uint64_
 
 }  // namespace
 
+bool is_procedural(const std::string& spec) {
+  return names(spec, "gallery") || names(spec, "city");
+}
+
 StatusOr<std::shared_ptr<Scene>> load_scene(const std::string& spec) {
   if (names(spec, "gallery")) {
     TESSERA_ASSIGN_OR_RETURN(const uint64_t detail, argument(spec, 1, 2));

@@ -1,0 +1,59 @@
+// The scenes that a daemon holds, by name. Each is on the device once, however many sessions stream it.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "server/frame_plan.h"
+#include "server/shared_scene.h"
+#include "server/stream_server.h"
+
+namespace tessera::server {
+
+struct SceneInfo {
+  std::string name, source;
+  uint64_t triangles = 0;  // instanced
+  uint32_t materials = 0;
+  double device_mib = 0;  // what loading it added
+  std::vector<std::string> notes;
+  FramePlan plan;
+};
+
+// Thread-safe. `server` runs all that touches the device; both outlive the library.
+class SceneLibrary {
+ public:
+  // `root`: files that load() may read lie below it; empty: only procedural scenes.
+  SceneLibrary(std::shared_ptr<gpu::Device> device, StreamServer& server, std::filesystem::path root);
+  ~SceneLibrary();
+
+  // InvalidArgument: a name that is not 1..64 of [A-Za-z0-9._-], or a source outside the root. AlreadyExists.
+  // Else what the import says.
+  StatusOr<SceneInfo> load(const std::string& name, const std::string& source);
+  // The operator's own: any file.
+  StatusOr<SceneInfo> load_trusted(const std::string& name, const std::string& source);
+  // NotFound.
+  StatusOr<std::shared_ptr<SharedScene>> find(const std::string& name) const;
+  // NotFound; FailedPrecondition: sessions use it.
+  Status unload(const std::string& name);
+  std::vector<SceneInfo> list() const;
+
+ private:
+  struct Entry {
+    SceneInfo info;
+    std::shared_ptr<SharedScene> scene;  // empty while it loads
+  };
+  StatusOr<std::string> inside_root(const std::string& source) const;
+  StatusOr<Entry> make(const std::string& name, const std::string& source);
+
+  const std::shared_ptr<gpu::Device> device_;
+  StreamServer& server_;
+  const std::filesystem::path root_;
+  mutable std::mutex mutex_;
+  std::map<std::string, Entry> entries_;
+};
+
+}  // namespace tessera::server

@@ -1,0 +1,76 @@
+#include "server/daemon_options.h"
+
+#include <gtest/gtest.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fstream>
+
+namespace tessera::server {
+namespace {
+
+struct Options {
+  CLI::App app{"test"};
+  DaemonSettings settings;
+  std::string log_level = "info";
+  Options() {
+    app.set_config("--config");
+    add_options(app, settings, log_level);
+  }
+};
+
+// What the daemon prints as its configuration reads back as the same settings (RELIABILITY R7).
+void expect_round_trip(const std::vector<std::string>& flags) {
+  Options first;
+  std::vector<std::string> reversed(flags.rbegin(), flags.rend());
+  ASSERT_NO_THROW(first.app.parse(reversed));
+  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "tesserad_round_trip.toml";
+  std::ofstream(file) << first.app.config_to_str(true, true);
+  Options second;
+  std::vector<std::string> from_file{file.string(), "--config"};
+  ASSERT_NO_THROW(second.app.parse(from_file)) << testing::PrintToString(flags);
+  EXPECT_EQ(first.settings, second.settings) << testing::PrintToString(flags);
+  EXPECT_EQ(first.log_level, second.log_level);
+  std::filesystem::remove(file);
+}
+
+TEST(DaemonOptions, EverySettingReadsBackAsItWasWritten) {
+  expect_round_trip({});
+  for (const std::vector<std::string>& flags :
+       std::vector<std::vector<std::string>>{{"--address", "::1"},
+                                             {"--control-port", "0"},
+                                             {"--meta-port", "65535"},
+                                             {"--media-port", "1"},
+                                             {"--tls-certificate", "a b.pem"},
+                                             {"--tls-key", "k\"ey.pem"},
+                                             {"--insecure"},
+                                             {"--max-sessions", "1024"},
+                                             {"--scene", "a=gallery"},
+                                             {"--scene", "a=gallery:1", "--scene", "b=my file.glb"},
+                                             {"--scene-root", "/srv/scenes"},
+                                             {"--device", "1"},
+                                             {"--log", "debug"}}) {
+    expect_round_trip(flags);
+  }
+}
+
+TEST(DaemonOptions, EveryOptionIsAnEnvironmentVariableToo) {
+  Options options;
+  for (const CLI::Option* option : options.app.get_options()) {
+    if (option->get_name() == "--help" || option->get_name() == "--config") continue;
+    EXPECT_TRUE(option->get_envname().starts_with("TESSERAD_")) << option->get_name();
+    EXPECT_FALSE(option->get_description().empty()) << option->get_name();
+  }
+}
+
+TEST(DaemonOptions, ValuesOutOfRangeAreRefused) {
+  for (const std::vector<std::string>& reversed : std::vector<std::vector<std::string>>{
+           {"0", "--max-sessions"}, {"65536", "--meta-port"}, {"-1", "--media-port"}, {"loud", "--log"}}) {
+    Options options;
+    std::vector<std::string> arguments = reversed;
+    EXPECT_THROW(options.app.parse(arguments), CLI::ParseError) << testing::PrintToString(reversed);
+  }
+}
+
+}  // namespace
+}  // namespace tessera::server
