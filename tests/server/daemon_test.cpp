@@ -4,8 +4,12 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
+#include <sys/wait.h>
+
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "client-sdk/connection.h"
@@ -177,6 +181,30 @@ TEST_F(DaemonTest, FilesAreReadBelowTheSceneRootOnly) {
   EXPECT_FALSE(broken.ok());
   EXPECT_EQ(broken.error_message().find("outside"), std::string::npos)
       << "it was read: " << broken.error_message();
+  std::filesystem::remove_all(folder);
+}
+
+TEST_F(DaemonTest, TheViewerProgramWritesPictures) {
+  start({.scenes = {"hall=gallery:0"}});
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "tessera_viewer";
+  std::filesystem::remove_all(folder);
+  const auto run = [&](const std::string& arguments) {
+    const std::string command = std::string(TESSERA_CLIENT) +
+                                " --control 127.0.0.1:" + std::to_string(daemon_->control_port()) +
+                                " --width 160 --height 90 " + arguments;
+    const int status = std::system(command.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  ASSERT_EQ(run("--scene hall --seconds 0.3 --save-every 5 --out " + folder.string() + " --json " +
+                (folder / "run.json").string()),
+            0);
+  EXPECT_GT(std::filesystem::file_size(folder / "000000.png"), 100u);
+  std::ifstream in(folder / "run.json");
+  const auto json = nlohmann::json::parse(in, nullptr, false);
+  EXPECT_GT(json.value("frames_displayed", 0), 0);
+  EXPECT_EQ(json.value("decode_errors", -1), 0);
+  EXPECT_EQ(run("--scene attic 2>/dev/null"), 1);
+  EXPECT_EQ(run("--scene hall --fps 0 2>/dev/null"), 2);
   std::filesystem::remove_all(folder);
 }
 
