@@ -7,7 +7,6 @@
 
 #include "base/camera_path.h"
 #include "bench/streamer.h"
-#include "bench/version.h"
 #include "pvs/prediction.h"
 #include "pvs/visibility.h"
 #include "scene/gltf.h"
@@ -96,23 +95,15 @@ nlohmann::json to_json(const CullingResult& result) {
   nlohmann::json frames = nlohmann::json::array();
   for (const CullingFrame& frame : result.frames) frames.push_back(to_json(frame));
   const Percentiles ratio = result.ratio();
-  return {{"schema", kSchema},
-          {"command", result.command},
-          {"commit", kCommit},
-          {"machine", machine_json()},
-          {"device",
-           {{"name", result.device.name},
-            {"driver", result.device.driver},
-            {"software", result.device.software}}},
-          {"settings", to_json(result.settings)},
-          {"rows",
-           {{{"ratio", {{"p50", ratio.p50}, {"p95", ratio.p95}, {"p99", ratio.p99}}},
-             {"differing_patches", result.differing_patches()}}}},
-          {"frames", frames}};
+  nlohmann::json run = run_json(result.command, result.device, result.settings);
+  run["rows"] = {{{"ratio", {{"p50", ratio.p50}, {"p95", ratio.p95}, {"p99", ratio.p99}}},
+                  {"differing_patches", result.differing_patches()}}};
+  run["frames"] = frames;
+  return run;
 }
 
 std::vector<std::string> culling_options() {
-  return {"scene", "path",   "start",    "seconds", "fps",      "size",
+  return {"scene", "path",   "start",    "seconds", "fps",        "size",
           "fov-y", "device", "delay-ms", "pvs",     "server-fps", "json"};
 }
 
@@ -127,12 +118,13 @@ StatusOr<CullingResult> run_culling(const LoopbackSettings& settings, Progress& 
   TESSERA_ASSIGN_OR_RETURN(study.instant, scene::SceneInstant::create(*device, *gpu_scene));
   TESSERA_ASSIGN_OR_RETURN(study.culled, pvs::Visibility::create(*device, *gpu_scene, {}));
   TESSERA_ASSIGN_OR_RETURN(
-      study.all, pvs::Visibility::create(*device, *gpu_scene,
-                                         {.frustum_culling = false, .occlusion_culling = false}));
+      study.all,
+      pvs::Visibility::create(*device, *gpu_scene, {.frustum_culling = false, .occlusion_culling = false}));
 
   CullingResult result{.settings = settings};
   result.device = {device->info().name, device->info().driver, device->info().software};
-  const auto frames = static_cast<uint64_t>(std::max(1L, std::lround(settings.seconds * settings.server_fps)));
+  const auto frames =
+      static_cast<uint64_t>(std::max(1L, std::lround(settings.seconds * settings.server_fps)));
   progress.begin("server frames", frames);
   for (uint64_t i = 0; i < frames; ++i) {
     const double path_s = settings.start_s + static_cast<double>(i) / settings.server_fps;

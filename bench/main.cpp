@@ -90,7 +90,8 @@ int run_culling(const bench::LoopbackSettings& settings) {
   const bench::Percentiles ratio = result->ratio();
   std::cout << absl::StrFormat("id buffers, culled / all drawn: median %.3f, p95 %.3f, first frame %.3f\n",
                                ratio.p50, ratio.p95, result->frames.front().ratio());
-  std::cout << "visible sets: " << result->differing_patches() << " patches differ in all frames together" << std::endl;
+  std::cout << "visible sets: " << result->differing_patches() << " patches differ in all frames together"
+            << std::endl;
   if (settings.json.empty()) return kOk;
   const Status written = bench::write_file(settings.json, bench::to_json(*result).dump(1) + "\n");
   return written.ok() ? kOk : report_failure(written);

@@ -22,8 +22,8 @@ bool MaskedTriangles::contains(uint32_t instanced_triangle) const {
   return after != ranges_.begin() && instanced_triangle < (after - 1)->end;
 }
 
-std::vector<uint8_t> masked_edges(std::span<const uint32_t> triangle_plus_one, uint32_t width, uint32_t height,
-                                  const MaskedTriangles& masked) {
+std::vector<uint8_t> masked_edges(std::span<const uint32_t> triangle_plus_one, uint32_t width,
+                                  uint32_t height, const MaskedTriangles& masked) {
   std::vector<uint32_t> is_masked(triangle_plus_one.size());
   for (size_t i = 0; i < is_masked.size(); ++i) {
     const uint32_t id = triangle_plus_one[i];

@@ -28,8 +28,8 @@ class MaskedTriangles {
 
 // 1 where a pixel of a masked material touches one of another material or of the background, and where such
 // a pixel touches it. `triangle_plus_one` as in shading::ReferenceImage.
-std::vector<uint8_t> masked_edges(std::span<const uint32_t> triangle_plus_one, uint32_t width, uint32_t height,
-                                  const MaskedTriangles& masked);
+std::vector<uint8_t> masked_edges(std::span<const uint32_t> triangle_plus_one, uint32_t width,
+                                  uint32_t height, const MaskedTriangles& masked);
 
 // The sum of a map over the pixels within 2 px of the edges, and their number: sums of frames add up.
 struct EdgeSum {

@@ -102,21 +102,23 @@ Percentiles percentiles(std::vector<double> values) {
   return {at(0.50), at(0.95), at(0.99)};
 }
 
-json to_json(const LoopbackResult& result) {
+json run_json(const std::string& command, const DeviceDescription& device, const LoopbackSettings& settings) {
   return {{"schema", kSchema},
-          {"command", result.command},
+          {"command", command},
           {"commit", kCommit},
           {"machine", machine_json()},
-          {"device",
-           {{"name", result.device.name},
-            {"driver", result.device.driver},
-            {"software", result.device.software}}},
-          {"settings", to_json(result.settings)},
-          {"notes", result.notes},
-          {"plan", result.plan},
-          {"rows", to_array(result.rows)},
-          {"split", to_array(result.split)},
-          {"frames", to_array(result.frames)}};
+          {"device", {{"name", device.name}, {"driver", device.driver}, {"software", device.software}}},
+          {"settings", to_json(settings)}};
+}
+
+json to_json(const LoopbackResult& result) {
+  json run = run_json(result.command, result.device, result.settings);
+  run["notes"] = result.notes;
+  run["plan"] = result.plan;
+  run["rows"] = to_array(result.rows);
+  run["split"] = to_array(result.split);
+  run["frames"] = to_array(result.frames);
+  return run;
 }
 
 json machine_json() {

@@ -90,6 +90,9 @@ struct LoopbackResult {
 
 nlohmann::json to_json(const LoopbackResult& result);
 
+// What every run's JSON begins with: how it came about.
+nlohmann::json run_json(const std::string& command, const DeviceDescription& device,
+                        const LoopbackSettings& settings);
 // Processor, cores, memory (MiB), operating system.
 nlohmann::json machine_json();
 // Peak resident memory of this process so far.

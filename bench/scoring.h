@@ -34,9 +34,9 @@ struct SplitErrors {
 };
 
 struct FrameScore {
-  std::vector<Comparison> methods;      // in the order of the pictures
-  std::vector<EdgeSum> near_masked;     // likewise: SSIM near masked edges; empty without masked materials
-  std::vector<uint8_t> masked_edges;    // masked_edges(); likewise
+  std::vector<Comparison> methods;    // in the order of the pictures
+  std::vector<EdgeSum> near_masked;   // likewise: SSIM near masked edges; empty without masked materials
+  std::vector<uint8_t> masked_edges;  // masked_edges(); likewise
   std::optional<SplitErrors> split;
 };
 

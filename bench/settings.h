@@ -71,8 +71,8 @@ struct LoopbackSettings {
   bool wants_baseline(std::string_view name) const;
 };
 
-// Adds the options `names` (all if empty) to `app`: flags, environment variables TESSERA_BENCH_<OPTION>, checks, groups.
-// `settings` must outlive the parse, and gives the defaults.
+// Adds the options `names` (all if empty) to `app`: flags, environment variables TESSERA_BENCH_<OPTION>,
+// checks, groups. `settings` must outlive the parse, and gives the defaults.
 void add_options(CLI::App& app, LoopbackSettings& settings, std::span<const std::string> names = {});
 
 // Option name → value, as JSON; what add_options() would read to get the same settings.

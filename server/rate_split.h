@@ -8,7 +8,7 @@ namespace tessera::server {
 struct RateSplit {
   double bitrate_bps = 20e6;  // both streams together
   double frames_per_second = 30;
-  double atlas_floor = 0.25;     // the atlas gets at least this share of its frame, however large the geometry
+  double atlas_floor = 0.25;  // the atlas gets at least this share of its frame, however large the geometry
   double key_frame_budgets = 4;  // a key frame may take this many frames' bits
 
   double frame_bits() const { return bitrate_bps / frames_per_second; }

@@ -27,7 +27,8 @@ scene::Scene three_quads() {
 constexpr uint32_t kWidth = 30, kHeight = 12;
 std::vector<uint32_t> columns() {
   std::vector<uint32_t> ids;
-  for (uint32_t i = 0; i < kWidth * kHeight; ++i) ids.push_back(i % kWidth < 10 ? 1 : i % kWidth < 20 ? 3 : 0);
+  for (uint32_t i = 0; i < kWidth * kHeight; ++i)
+    ids.push_back(i % kWidth < 10 ? 1 : i % kWidth < 20 ? 3 : 0);
   return ids;
 }
 

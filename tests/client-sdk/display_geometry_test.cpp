@@ -77,8 +77,8 @@ TEST(Geometry, MirroredObjectsShowTheMirroredPicture) {
   }
 }
 
-// A screen of strips about a pixel thin, at every slant: nearly every pixel is shared. Each strip shows its block's
-// ramp along it, so that a pixel's red tells where it was sampled.
+// A screen of strips about a pixel thin, at every slant: nearly every pixel is shared. Each strip shows its
+// block's ramp along it, so that a pixel's red tells where it was sampled.
 TEST(Geometry, PixelsSharedByThinPatchesAreSampledAtTheirCentres) {
   constexpr float kHalfLength = 1.5f, kRise = 0.034f, kTwoPi = 6.2831853f;
   constexpr int kTurns = 12;

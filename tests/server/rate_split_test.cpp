@@ -15,7 +15,8 @@ TEST(RateSplit, AtlasGetsWhatGeometryLeaves) {
 
 TEST(RateSplit, AtlasKeepsItsFloor) {
   for (double meta = 0; meta < 1e7; meta += 12345) {
-    for (const bool key : {false, true}) EXPECT_GE(kSplit.atlas_bits(meta, key), 0.25 * kSplit.atlas_bits(0, key));
+    for (const bool key : {false, true})
+      EXPECT_GE(kSplit.atlas_bits(meta, key), 0.25 * kSplit.atlas_bits(0, key));
   }
 }
 
