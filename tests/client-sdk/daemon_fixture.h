@@ -17,6 +17,7 @@ namespace tessera::client::test {
 class DaemonFixture : public testing::Test {
  protected:
   void SetUp() override { start({}); }
+  // With free ports.
   void start(server::DaemonSettings settings) {
     daemon_.reset();
     settings.scenes = {"hall=gallery:0"};
