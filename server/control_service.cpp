@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "server/session.h"
 
 namespace tessera::server {
 namespace {
@@ -107,7 +108,7 @@ grpc::Status ControlService::CreateSession(grpc::ServerContext*, const v1::Creat
   if (!settings.ok()) return to_grpc(settings.status());
   StatusOr<std::shared_ptr<SharedScene>> scene = scenes_.find(request->scene());
   if (!scene.ok()) return to_grpc(scene.status());
-  const StatusOr<SessionTicket> ticket = server_.create_session(*std::move(scene), *settings);
+  const StatusOr<SessionTicket> ticket = server_.create_session(renders(*std::move(scene)), *settings);
   if (!ticket.ok()) return to_grpc(ticket.status());
   {
     const std::lock_guard lock(mutex_);

@@ -32,10 +32,14 @@ Status check_exposure(const StreamServerSettings& settings) {
       " would send tokens and pictures in clear text: give a TLS certificate, or say --insecure"));
 }
 
-StatusOr<uint64_t> random_bytes(std::span<uint8_t> out) {
+Status fill_random(std::span<uint8_t> out) {
   if (RAND_bytes(out.data(), static_cast<int>(out.size())) != 1)
     return absl::InternalError("RAND_bytes: no random numbers to be had");
-  return out.size();
+  return absl::OkStatus();
+}
+
+Status no_such_session(SessionId id) {
+  return absl::NotFoundError(absl::StrCat("there is no session ", id));
 }
 
 struct Entry {
@@ -57,6 +61,7 @@ struct StreamServer::Impl {
   void wake();
   StatusOr<transport::Admission> admit(const transport::Hello& hello, const std::string& peer);
   transport::MediaSessionEvents media_events(const std::shared_ptr<StreamedSession>& session);
+  StatusOr<std::shared_ptr<StreamedSession>> find(SessionId id) const;
   std::shared_ptr<StreamedSession> take(SessionId id);
   Status end(SessionId id, const Status& reason);
 
@@ -202,7 +207,7 @@ std::shared_ptr<StreamedSession> StreamServer::Impl::take(SessionId id) {
 
 Status StreamServer::Impl::end(SessionId id, const Status& reason) {
   const std::shared_ptr<StreamedSession> session = take(id);
-  if (!session) return absl::NotFoundError(absl::StrCat("there is no session ", id));
+  if (!session) return no_such_session(id);
   session->close(reason);
   media->remove_session(id, std::string(reason.message()));
   {
@@ -241,21 +246,21 @@ StreamServer::~StreamServer() {
   s.do_device_work(lock);
 }
 
-StatusOr<SessionTicket> StreamServer::create_session(std::shared_ptr<SharedScene> scene,
+StatusOr<SessionTicket> StreamServer::create_session(RendererFactory renderer,
                                                      const SessionSettings& settings) {
   Impl& s = *impl_;
   SessionTicket ticket{.media_port = media_port(), .meta_port = meta_port()};
   std::array<uint8_t, 8> seed{};
-  TESSERA_RETURN_IF_ERROR(random_bytes(ticket.token).status());
-  TESSERA_RETURN_IF_ERROR(random_bytes(seed).status());
+  TESSERA_RETURN_IF_ERROR(fill_random(ticket.token));
+  TESSERA_RETURN_IF_ERROR(fill_random(seed));
   transport::RtpSenderSettings rtp{.pacer = {.rate_bps = settings.rate.bitrate_bps}};
   std::copy(seed.begin(), seed.end(), reinterpret_cast<uint8_t*>(&rtp.seed));
   TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<transport::RtpSender> sender, transport::RtpSender::create(rtp));
   Entry entry{.token = ticket.token, .ids = sender->ids()};
   if (s.settings.meta.tls) {
     entry.srtp.emplace();
-    TESSERA_RETURN_IF_ERROR(random_bytes(entry.srtp->server).status());
-    TESSERA_RETURN_IF_ERROR(random_bytes(entry.srtp->client).status());
+    TESSERA_RETURN_IF_ERROR(fill_random(entry.srtp->server));
+    TESSERA_RETURN_IF_ERROR(fill_random(entry.srtp->client));
   }
 
   const std::lock_guard lock(s.mutex);
@@ -265,7 +270,7 @@ StatusOr<SessionTicket> StreamServer::create_session(std::shared_ptr<SharedScene
   }
   ticket.session = s.next_id++;
   entry.session =
-      std::make_shared<StreamedSession>(ticket.session, std::move(scene), settings, s.media, s.clock);
+      std::make_shared<StreamedSession>(ticket.session, std::move(renderer), settings, s.media, s.clock);
   TESSERA_RETURN_IF_ERROR(s.media->add_session(ticket.session, ticket.token, std::move(sender),
                                                s.media_events(entry.session), entry.srtp));
   s.sessions.emplace(ticket.session, std::move(entry));
@@ -285,18 +290,29 @@ void StreamServer::end_all(const std::string& reason) {
   for (const SessionId id : open) (void)end_session(id, reason);
 }
 
+StatusOr<std::shared_ptr<StreamedSession>> StreamServer::Impl::find(SessionId id) const {
+  const std::lock_guard lock(mutex);
+  const auto found = sessions.find(id);
+  if (found == sessions.end()) return no_such_session(id);
+  return found->second.session;
+}
+
 StatusOr<StreamedSessionStats> StreamServer::stats(SessionId session) const {
-  const std::lock_guard lock(impl_->mutex);
-  const auto found = impl_->sessions.find(session);
-  if (found == impl_->sessions.end())
-    return absl::NotFoundError(absl::StrCat("there is no session ", session));
-  return found->second.session->stats();
+  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, impl_->find(session));
+  return found->stats();
+}
+
+StatusOr<std::vector<FrameRecord>> StreamServer::records(SessionId session, uint64_t first,
+                                                         uint64_t& next) const {
+  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, impl_->find(session));
+  return found->records(first, next);
 }
 
 size_t StreamServer::sessions() const {
   const std::lock_guard lock(impl_->mutex);
   return impl_->sessions.size();
 }
+
 Status StreamServer::run_on_device(const std::function<Status()>& work) {
   std::packaged_task<Status()> task(work);
   std::future<Status> result = task.get_future();

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/time.h"
-#include "server/session.h"
+#include "server/frame.h"
 #include "server/streamed_session.h"
 #include "transport/asio/media_port.h"
 #include "transport/asio/meta_listener.h"
@@ -39,13 +39,15 @@ class StreamServer {
   // Tells all clients and waits for its threads.
   ~StreamServer();
 
-  // The session waits for its client; it renders once both its connections stand. All scenes are of one
-  // device. ResourceExhausted: max_sessions.
-  StatusOr<SessionTicket> create_session(std::shared_ptr<SharedScene> scene, const SessionSettings& settings);
+  // The session waits for its client; it renders once both its connections stand. All renderers are of one
+  // device (see renders()). ResourceExhausted: max_sessions.
+  StatusOr<SessionTicket> create_session(RendererFactory renderer, const SessionSettings& settings);
   // NotFound.
   Status end_session(transport::SessionId session, const std::string& reason);
   void end_all(const std::string& reason);
   StatusOr<StreamedSessionStats> stats(transport::SessionId session) const;
+  // See StreamedSession::records().
+  StatusOr<std::vector<FrameRecord>> records(transport::SessionId session, uint64_t first, uint64_t& next) const;
   size_t sessions() const;
 
   // Runs `work` on the render thread, between two frames, and waits for it: a device belongs to one thread.
