@@ -37,6 +37,7 @@ struct ServerFrameTimes {
   DurationNs visibility = 0, layout = 0, shading = 0, encode = 0;
 
   DurationNs stages() const { return visibility + layout + shading + encode; }
+  bool operator==(const ServerFrameTimes&) const = default;
 };
 
 struct FrameRecord {

@@ -31,8 +31,8 @@ struct ConnectionStats {
   std::optional<DurationNs> clock_offset_ns;  // the server's clock minus ours
 };
 
-// Owns a thread that receives and one that decodes. take_newest() and report_displayed() belong to one drawing
-// thread, as in ClientCore; the rest may be called from any thread.
+// Owns a thread that receives and one that decodes. take_newest() and report_displayed() belong to one
+// drawing thread, as in ClientCore; the rest may be called from any thread.
 class Connection {
  public:
   // Blocks until both connections stand, or one has failed; the error names the step (connect, TLS, hello,

@@ -5,10 +5,13 @@
 #include <utility>
 
 #include "base/log.h"
+#include "proto/frame_record.h"
 #include "server/session.h"
 
 namespace tessera::server {
 namespace {
+
+constexpr std::chrono::milliseconds kWatchInterval{50};  // of frame records
 
 grpc::Status to_grpc(const Status& status) {
   // The codes have the same numbers.
@@ -182,8 +185,31 @@ grpc::Status ControlService::WatchSession(grpc::ServerContext* context,
     const StatusOr<v1::Session> session = describe(request->session());
     if (!session.ok()) return to_grpc(session.status());
     if (!writer->Write(*session)) break;
-    std::unique_lock lock(mutex_);
-    drained_.wait_for(lock, std::chrono::milliseconds(interval_ms), [this] { return draining_.load(); });
+    wait(std::chrono::milliseconds(interval_ms));
+  }
+  return grpc::Status::OK;
+}
+
+void ControlService::wait(std::chrono::milliseconds time) {
+  std::unique_lock lock(mutex_);
+  drained_.wait_for(lock, time, [this] { return draining_.load(); });
+}
+
+grpc::Status ControlService::WatchFrames(grpc::ServerContext* context, const v1::WatchFramesRequest* request,
+                                         grpc::ServerWriter<v1::FrameRecord>* writer) {
+  uint64_t next = request->first();
+  while (!context->IsCancelled() && !draining_) {
+    const auto records = server_.records(request->session(), next, next);
+    if (!records.ok()) return to_grpc(records.status());
+    uint64_t index = next - records->size();
+    for (const FrameRecord& record : *records) {
+      v1::FrameRecord message;
+      write(record, message);
+      message.set_index(index++);
+      if (!writer->Write(message)) return grpc::Status::OK;
+    }
+    if (request->once()) break;
+    wait(kWatchInterval);
   }
   return grpc::Status::OK;
 }

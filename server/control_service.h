@@ -34,6 +34,8 @@ class ControlService final : public v1::Control::Service {
                              v1::DeleteSessionResponse*) override;
   grpc::Status WatchSession(grpc::ServerContext*, const v1::WatchSessionRequest*,
                             grpc::ServerWriter<v1::Session>*) override;
+  grpc::Status WatchFrames(grpc::ServerContext*, const v1::WatchFramesRequest*,
+                           grpc::ServerWriter<v1::FrameRecord>*) override;
 
  private:
   struct Known {
@@ -43,6 +45,8 @@ class ControlService final : public v1::Control::Service {
   Status check_open() const;
   v1::Scene describe(const SceneInfo& info) const;
   StatusOr<v1::Session> describe(uint64_t session);
+  // Or until the daemon drains.
+  void wait(std::chrono::milliseconds time);
 
   StreamServer& server_;
   SceneLibrary& scenes_;

@@ -184,7 +184,8 @@ StatusOr<Frame> Session::render(const FrameInput& input) {
 }
 
 RendererFactory renders(std::shared_ptr<SharedScene> scene) {
-  return [scene = std::move(scene)](const SessionSettings& settings) -> StatusOr<std::unique_ptr<FrameRenderer>> {
+  return [scene =
+              std::move(scene)](const SessionSettings& settings) -> StatusOr<std::unique_ptr<FrameRenderer>> {
     return Session::create(scene, settings);
   };
 }

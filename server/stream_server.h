@@ -47,7 +47,8 @@ class StreamServer {
   void end_all(const std::string& reason);
   StatusOr<StreamedSessionStats> stats(transport::SessionId session) const;
   // See StreamedSession::records().
-  StatusOr<std::vector<FrameRecord>> records(transport::SessionId session, uint64_t first, uint64_t& next) const;
+  StatusOr<std::vector<FrameRecord>> records(transport::SessionId session, uint64_t first,
+                                             uint64_t& next) const;
   size_t sessions() const;
 
   // Runs `work` on the render thread, between two frames, and waits for it: a device belongs to one thread.

@@ -32,8 +32,7 @@ class StreamedSession {
 
   // `settings.client_view` is replaced by what the client's hello says.
   StreamedSession(transport::SessionId id, RendererFactory make_renderer, const SessionSettings& settings,
-                  std::shared_ptr<transport::MediaPort> media,
-                  const Clock& clock);
+                  std::shared_ptr<transport::MediaPort> media, const Clock& clock);
 
   void on_connected(std::shared_ptr<transport::MetaConnection> connection);
   void on_closed(const Status& reason);

@@ -15,7 +15,7 @@ constexpr float kMaxTangent = 60;
 constexpr uint8_t kNoSrtp = 0, kSrtpAes128Sha1 = 1;
 
 // In this order.
-constexpr TimeNs ClientFrameTimes::* kTimesOnTheWire[] = {
+constexpr TimeNs ClientFrameTimes::*kTimesOnTheWire[] = {
     &ClientFrameTimes::atlas_first_packet, &ClientFrameTimes::atlas_complete,
     &ClientFrameTimes::atlas_decode_begin, &ClientFrameTimes::atlas_decoded,
     &ClientFrameTimes::meta_complete,      &ClientFrameTimes::meta_decode_begin,

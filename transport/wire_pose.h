@@ -22,8 +22,8 @@ constexpr bool is_sane(TimeNs t) {
 }
 
 void write_pose(const SequencedPose& pose, ByteWriter& out);
-// Latches the reader's error for a time beyond kMaxTimeNs, a value that is not finite, a position beyond ±kMaxPositionM, or a
-// quaternion whose length is not within 0.5..2. The result has unit length.
+// Latches the reader's error for a time beyond kMaxTimeNs, a value that is not finite, a position beyond
+// ±kMaxPositionM, or a quaternion whose length is not within 0.5..2. The result has unit length.
 SequencedPose read_pose(ByteReader& in);
 
 // Newest wins: whether a pose is newer than all before it (serial numbers, RFC 1982).

@@ -36,7 +36,8 @@ TEST(FrameRecord, DurationsAreWhatTheTimesSay) {
   const auto d = durations(known());
   ASSERT_TRUE(d);
   const std::vector<DurationNs> expected{3, 7, 48, 30, 7, 9, 11, 7};
-  for (size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(d->named()[i].second, expected[i]) << d->named()[i].first;
+  for (size_t i = 0; i < expected.size(); ++i)
+    EXPECT_EQ(d->named()[i].second, expected[i]) << d->named()[i].first;
   EXPECT_FALSE(d->atlas_last);
   EXPECT_EQ(d->end_to_end, 117);
   // 5 late, 2 between the stages, 2 to hand over to the network, 4 until the decoder begins.

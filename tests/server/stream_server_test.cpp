@@ -182,7 +182,8 @@ TEST_F(StreamServerTest, EveryFramesRecordTilesItsTimeFromPoseToPicture) {
     const auto more = server_->records(a.session, next, next);
     ASSERT_TRUE(more.ok()) << more.status();
     records.insert(records.end(), more->begin(), more->end());
-    whole = static_cast<size_t>(std::ranges::count_if(records, [](const auto& r) { return durations(r).has_value(); }));
+    whole = static_cast<size_t>(
+        std::ranges::count_if(records, [](const auto& r) { return durations(r).has_value(); }));
     std::this_thread::sleep_for(std::chrono::nanoseconds(kDisplayNs));
   }
   ASSERT_GE(whole, 10u);
@@ -205,12 +206,13 @@ TEST_F(StreamServerTest, EveryFramesRecordTilesItsTimeFromPoseToPicture) {
   }
 }
 
-// The same inputs give the same pictures, whether real sockets and clocks lie between the two ends or nothing.
+// The same inputs give the same pictures, whether real sockets and clocks lie between the two ends or
+// nothing.
 TEST_F(StreamServerTest, PicturesOverSocketsAreThoseOfVirtualTime) {
   start();
   std::vector<Recorded> log;  // the render thread's, until the server is gone
-  const auto recording = [&, make = renders(scene_)](
-                             const SessionSettings& s) -> StatusOr<std::unique_ptr<FrameRenderer>> {
+  const auto recording =
+      [&, make = renders(scene_)](const SessionSettings& s) -> StatusOr<std::unique_ptr<FrameRenderer>> {
     TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<FrameRenderer> session, make(s));
     return std::make_unique<RecordingRenderer>(std::move(session), log);
   };
