@@ -72,6 +72,8 @@ class Session {
                                                    const SessionSettings& settings);
   ~Session();
 
+  // For the frames from now on.
+  void set_rate(const RateSplit& rate);
   // Blocks until the frame is encoded. The first frame is a key frame.
   StatusOr<Frame> render(const FrameInput& input);
 

@@ -12,13 +12,20 @@ constexpr DurationNs kHistoryNs = kNsPerSecond / 2;       // of poses, for predi
 constexpr DurationNs kFirstRoundTripNs = 100 * kNsPerMs;  // assumed before the client has reported one
 constexpr DurationNs kMaxRoundTripNs = kNsPerSecond;
 constexpr size_t kMaxFramesInFlight = 256;
+constexpr DurationNs kRateWindowNs = kNsPerSecond;
 
 }  // namespace
 
 StreamedSession::StreamedSession(transport::SessionId id, std::shared_ptr<SharedScene> scene,
                                  const SessionSettings& settings, std::shared_ptr<transport::MediaPort> media,
-                                 const Clock& clock)
-    : id_(id), media_(std::move(media)), clock_(clock), settings_(settings), scene_(std::move(scene)) {
+                                 const Clock& clock, OnRendered on_rendered)
+    : id_(id),
+      media_(std::move(media)),
+      clock_(clock),
+      settings_(settings),
+      on_rendered_(std::move(on_rendered)),
+      scene_(std::move(scene)),
+      rate_(settings.rate) {
   stats_.round_trip_ns = kFirstRoundTripNs;
 }
 
@@ -132,7 +139,8 @@ TimeNs StreamedSession::due_ns() const {
 StreamedSession::Work StreamedSession::take_work() {
   const std::lock_guard lock(mutex_);
   if (std::exchange(restart_, false)) session_.reset();
-  return {poses_, connection_, client_view_, stats_.round_trip_ns, std::exchange(key_frame_wanted_, false)};
+  return {poses_, connection_, client_view_, stats_.round_trip_ns, std::exchange(key_frame_wanted_, false),
+          rate_};
 }
 
 // Frames keep their rhythm; one that comes too late begins a new one.
@@ -147,15 +155,43 @@ void StreamedSession::put_off(bool sent, FrameNumber number, TimeNs pose_ns) {
   if (pose_of_frame_.size() > kMaxFramesInFlight) pose_of_frame_.erase(pose_of_frame_.begin());
 }
 
+void StreamedSession::count(const Frame& frame) {
+  const TimeNs now = clock_.now();
+  const std::lock_guard lock(mutex_);
+  stats_.key_frames += frame.atlas.key_frame ? 1 : 0;
+  stats_.meta_bytes += frame.meta.size();
+  stats_.encoder = session_->encoder();
+  std::erase_if(sent_, [&](const auto& s) { return s.first <= now - kRateWindowNs; });
+  sent_.emplace_back(now, frame.meta.size() + frame.atlas.bytes.size());
+}
+
+Status StreamedSession::set_rate(double bitrate_bps, double frames_per_second) {
+  {
+    const std::lock_guard lock(mutex_);
+    rate_.bitrate_bps = bitrate_bps;
+    rate_.frames_per_second = frames_per_second;
+  }
+  return media_->set_rate(id_, bitrate_bps);
+}
+
+RateSplit StreamedSession::rate() const {
+  const std::lock_guard lock(mutex_);
+  return rate_;
+}
+
 Status StreamedSession::render() {
   Work work = take_work();
   if (!work.connection || work.poses.empty()) return absl::OkStatus();
   if (!session_) {
     SessionSettings settings = settings_;
     settings.client_view = work.client_view;
+    settings.rate = work.rate;
     TESSERA_ASSIGN_OR_RETURN(session_, Session::create(scene_, settings));
   }
-  TESSERA_ASSIGN_OR_RETURN(const double budget, media_->frame_budget_bits(id_, period_ns(), work.key_frame));
+  session_->set_rate(work.rate);
+  TESSERA_ASSIGN_OR_RETURN(
+      const double budget,
+      media_->frame_budget_bits(id_, from_seconds(1 / work.rate.frames_per_second), work.key_frame));
   if (budget <= 0) {  // frames are dropped before they are encoded, never after
     if (work.key_frame) on_key_frame_request();
     put_off(false, 0, 0);
@@ -169,6 +205,8 @@ Status StreamedSession::render() {
                                                                 .scene_time_ns = start,
                                                                 .key_frame = work.key_frame}));
   put_off(true, number, frame.pose.time_ns);
+  count(frame);
+  if (on_rendered_) on_rendered_(frame.stats);
   // A client that left meanwhile is no error of this frame: on_closed() tells.
   if (!work.connection->send(FrameType::meta, frame.meta).ok()) return absl::OkStatus();
   const auto sent = media_->send_frame(id_, start, frame.atlas.bytes, frame.atlas.key_frame);
@@ -188,6 +226,10 @@ StreamedSessionStats StreamedSession::stats() const {
   const std::lock_guard lock(mutex_);
   StreamedSessionStats stats = stats_;
   stats.connected = connection_ != nullptr;
+  for (const auto& [when, bytes] : sent_)
+    if (when > clock_.now() - kRateWindowNs) stats.bitrate_bps += 8 * static_cast<double>(bytes);
+  stats.media = media_->sender_stats(id_).value_or(stats.media);
+  stats.peer = media_->peer_report(id_);
   return stats;
 }
 

@@ -1,11 +1,14 @@
 // One client of a StreamServer: what its connections bring in, and the frames that go out to it.
 #pragma once
 
+#include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/session.h"
@@ -17,7 +20,13 @@ namespace tessera::server {
 struct StreamedSessionStats {
   bool connected = false;
   uint64_t frames_sent = 0;
-  uint64_t frames_skipped = 0;   // periods given up: the network still held the frame before
+  uint64_t frames_skipped = 0;  // periods given up: the network still held the frame before
+  uint64_t key_frames = 0;      // of those sent
+  uint64_t meta_bytes = 0;      // of geometry sent
+  double bitrate_bps = 0;       // measured: of the last second's frames, atlas and geometry
+  std::string encoder;          // which one runs, and why; empty before the first frame
+  transport::RtpSenderStats media;
+  std::optional<transport::PeerReport> peer;  // what the client last reported of the media
   DurationNs round_trip_ns = 0;  // from a pose to the picture that shows its frame, as the client reports it
   Status ended;                  // why the client left, or OK
 };
@@ -27,9 +36,11 @@ struct StreamedSessionStats {
 class StreamedSession {
  public:
   // `settings.client_view` is replaced by what the client's hello says.
+  // `on_rendered` is called by the render thread after each frame, and must not block.
+  using OnRendered = std::function<void(const FrameStats&)>;
   StreamedSession(transport::SessionId id, std::shared_ptr<SharedScene> scene,
                   const SessionSettings& settings, std::shared_ptr<transport::MediaPort> media,
-                  const Clock& clock);
+                  const Clock& clock, OnRendered on_rendered = {});
 
   void on_connected(std::shared_ptr<transport::MetaConnection> connection);
   void on_closed(const Status& reason);
@@ -46,12 +57,15 @@ class StreamedSession {
   bool ready() const;
   // When its next frame should start, on the server's clock.
   TimeNs due_ns() const;
+  // From the next frame on.
+  Status set_rate(double bitrate_bps, double frames_per_second);
+  RateSplit rate() const;
   // Renders and sends a frame, or skips it while the network is behind. An error ends the session.
   Status render();
   // Lets go of all that lies on the device; nothing is rendered afterwards.
   void release();
   StreamedSessionStats stats() const;
-  const SessionSettings& settings() const { return settings_; }
+  const SessionSettings& settings() const { return settings_; }  // as created; see rate()
   transport::SessionId id() const { return id_; }
 
  private:
@@ -61,17 +75,20 @@ class StreamedSession {
     View client_view;
     DurationNs round_trip_ns = 0;
     bool key_frame = false;
+    RateSplit rate;
   };
   Status on_timing(std::span<const uint8_t> payload);
   Status answer_ping(std::span<const uint8_t> payload);
   Work take_work();
   void put_off(bool sent, FrameNumber number, TimeNs pose_ns);
-  DurationNs period_ns() const { return from_seconds(1.0 / settings_.rate.frames_per_second); }
+  void count(const Frame& frame);
+  DurationNs period_ns() const { return from_seconds(1.0 / rate_.frames_per_second); }  // under the lock
 
   const transport::SessionId id_;
   const std::shared_ptr<transport::MediaPort> media_;
   const Clock& clock_;
   const SessionSettings settings_;
+  const OnRendered on_rendered_;
   std::shared_ptr<SharedScene> scene_;  // the render thread's, with all of the device
   std::unique_ptr<Session> session_;    // likewise
   FrameNumber next_frame_ = 1;          // likewise
@@ -83,6 +100,8 @@ class StreamedSession {
   std::map<FrameNumber, TimeNs> pose_of_frame_;
   bool admitted_ = false, bound_ = false, key_frame_wanted_ = false, restart_ = false;
   TimeNs due_ns_ = 0;
+  RateSplit rate_;
+  std::deque<std::pair<TimeNs, uint64_t>> sent_;  // when, bytes; of the last second
   StreamedSessionStats stats_;
 };
 
