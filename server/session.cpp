@@ -141,8 +141,11 @@ StatusOr<std::unique_ptr<Session>> Session::create(std::shared_ptr<SharedScene> 
   impl->settings = settings;
   impl->scene = std::move(scene);
   TESSERA_RETURN_IF_ERROR(impl->set_up());
-  spdlog::info("session: encoder {}", impl->encoder->choice());
   return std::unique_ptr<Session>(new Session(std::move(impl)));
+}
+
+void Session::set_rate(const RateSplit& rate) {
+  impl_->settings.rate = rate;
 }
 
 StatusOr<Frame> Session::render(const FrameInput& input) {
@@ -181,6 +184,13 @@ StatusOr<Frame> Session::render(const FrameInput& input) {
       layout.changed, frame.atlas.bytes.size(), frame.meta.size(), times.visibility_ms, times.layout_ms,
       times.shading_ms, times.encode_ms);
   return frame;
+}
+
+RendererFactory renders(std::shared_ptr<SharedScene> scene) {
+  return [scene =
+              std::move(scene)](const SessionSettings& settings) -> StatusOr<std::unique_ptr<FrameRenderer>> {
+    return Session::create(scene, settings);
+  };
 }
 
 const FramePlan& Session::plan() const {

@@ -14,6 +14,7 @@
 
 #include "base/log.h"
 #include "transport/asio/endpoint.h"
+#include "transport/sdp.h"
 
 namespace tessera::server {
 namespace {
@@ -22,20 +23,32 @@ namespace asio = transport::asio;
 using transport::SessionId;
 using transport::SessionToken;
 
-Status check_exposure(const StreamServerSettings& settings) {
-  TESSERA_ASSIGN_OR_RETURN(const asio::ip::address media, transport::parse_address(settings.media.address));
-  TESSERA_ASSIGN_OR_RETURN(const asio::ip::address meta, transport::parse_address(settings.meta.address));
-  if (settings.insecure || (media.is_loopback() && meta.is_loopback())) return absl::OkStatus();
-  if (settings.meta.tls) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
-      "binding ", settings.meta.address, " and ", settings.media.address,
-      " would send tokens and pictures in clear text: give a TLS certificate, or say --insecure"));
-}
-
-StatusOr<uint64_t> random_bytes(std::span<uint8_t> out) {
+Status fill_random(std::span<uint8_t> out) {
   if (RAND_bytes(out.data(), static_cast<int>(out.size())) != 1)
     return absl::InternalError("RAND_bytes: no random numbers to be had");
-  return out.size();
+  return absl::OkStatus();
+}
+
+Status no_such_session(SessionId id) {
+  return absl::NotFoundError(absl::StrCat("there is no session ", id));
+}
+
+void add_counters(StreamedSessionStats& sum, const StreamedSessionStats& s) {
+  sum.frames_sent += s.frames_sent;
+  sum.frames_skipped += s.frames_skipped;
+  sum.key_frames += s.key_frames;
+  sum.meta_bytes += s.meta_bytes;
+  sum.media.packets += s.media.packets;
+  sum.media.bytes += s.media.bytes;
+  sum.media.retransmitted += s.media.retransmitted;
+  sum.media.retransmitted_bytes += s.media.retransmitted_bytes;
+  sum.media.nacked += s.media.nacked;
+  sum.media.key_frame_requests += s.media.key_frame_requests;
+  sum.media.malformed_rtcp += s.media.malformed_rtcp;
+}
+
+uint64_t texels(const SessionSettings& settings) {
+  return uint64_t{settings.layout.width} * settings.layout.height;
 }
 
 struct Entry {
@@ -47,6 +60,16 @@ struct Entry {
 
 }  // namespace
 
+Status check_exposure(const StreamServerSettings& settings) {
+  TESSERA_ASSIGN_OR_RETURN(const asio::ip::address media, transport::parse_address(settings.media.address));
+  TESSERA_ASSIGN_OR_RETURN(const asio::ip::address meta, transport::parse_address(settings.meta.address));
+  if (settings.insecure || (media.is_loopback() && meta.is_loopback())) return absl::OkStatus();
+  if (settings.meta.tls) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "binding ", settings.meta.address, " and ", settings.media.address,
+      " would send tokens and pictures in clear text: give a TLS certificate, or say --insecure"));
+}
+
 struct StreamServer::Impl {
   Impl(const StreamServerSettings& s, const Clock& c) : settings(s), clock(c), work(io.get_executor()) {}
 
@@ -57,6 +80,9 @@ struct StreamServer::Impl {
   void wake();
   StatusOr<transport::Admission> admit(const transport::Hello& hello, const std::string& peer);
   transport::MediaSessionEvents media_events(const std::shared_ptr<StreamedSession>& session);
+  Status check_room(const SessionSettings& wanted) const;
+  void refuse(const Status& reason, const std::string& peer);
+  StatusOr<std::shared_ptr<StreamedSession>> find(SessionId id) const;
   std::shared_ptr<StreamedSession> take(SessionId id);
   Status end(SessionId id, const Status& reason);
 
@@ -74,6 +100,9 @@ struct StreamServer::Impl {
   std::vector<std::shared_ptr<StreamedSession>>
       ended;  // whose device objects the render thread has to release
   std::deque<std::packaged_task<Status()>> device_work;
+  StreamedSessionStats ended_counters;
+  std::map<absl::StatusCode, uint64_t> refused_clients;
+  transport::LogLimiter refusal_log;
   bool stopping = false, woken = false;
   std::thread io_thread, render_thread;
 };
@@ -84,7 +113,9 @@ Status StreamServer::Impl::open() {
   TESSERA_ASSIGN_OR_RETURN(
       meta, transport::MetaListener::open(io.get_executor(), settings.meta,
                                           [this](const transport::Hello& hello, const std::string& peer) {
-                                            return admit(hello, peer);
+                                            auto admission = admit(hello, peer);
+                                            if (!admission.ok()) refuse(admission.status(), peer);
+                                            return admission;
                                           }));
   io_thread = std::thread([this] { io.run(); });
   render_thread = std::thread([this] { run_renderer(); });
@@ -132,7 +163,8 @@ void StreamServer::Impl::run_renderer() {
   while (const std::shared_ptr<StreamedSession> session = next_ready(lock)) {
     lock.unlock();
     if (const Status status = session->render(); !status.ok()) {
-      spdlog::error("session {}: {}", session->id(), status.ToString());
+      log_event(spdlog::level::err, "session failed",
+                {{"session", session->id()}, {"reason", status.ToString()}});
       (void)end(session->id(), status);
     }
     lock.lock();
@@ -164,7 +196,8 @@ StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello&
 
   const std::shared_ptr<StreamedSession> session = entry.session;
   TESSERA_RETURN_IF_ERROR(session->admit(hello.client));
-  spdlog::info("session {}: {} connected from {}", session->id(), hello.client.name, peer);
+  log_event(spdlog::level::info, "client connected",
+            {{"session", session->id()}, {"name", hello.client.name}, {"peer", peer}});
   const SessionSettings& s = session->settings();
   return transport::Admission{
       .welcome = {.session = session->id(),
@@ -172,7 +205,7 @@ StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello&
                   .stream = entry.ids,
                   .atlas_width = static_cast<uint16_t>(s.layout.width),
                   .atlas_height = static_cast<uint16_t>(s.layout.height),
-                  .frames_per_second = static_cast<float>(s.rate.frames_per_second),
+                  .frames_per_second = static_cast<float>(session->rate().frames_per_second),
                   .srtp = entry.srtp},
       .events = {.on_frame =
                      [this, session](transport::FrameType type, std::span<const uint8_t> payload) {
@@ -182,7 +215,8 @@ StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello&
                      },
                  .on_closed =
                      [session](const Status& reason) {
-                       spdlog::info("session {}: client left: {}", session->id(), reason.ToString());
+                       log_event(spdlog::level::info, "client left",
+                                 {{"session", session->id()}, {"reason", reason.ToString()}});
                        session->on_closed(reason);
                      }},
       .on_connected = [this, session](std::shared_ptr<transport::MetaConnection> connection) {
@@ -191,18 +225,47 @@ StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello&
       }};
 }
 
+// Whoever guesses at tokens must not fill the log.
+void StreamServer::Impl::refuse(const Status& reason, const std::string& peer) {
+  std::optional<uint64_t> count;
+  {
+    const std::lock_guard lock(mutex);
+    ++refused_clients[reason.code()];
+    count = refusal_log.event(clock.now());
+  }
+  if (count) {
+    log_event(spdlog::level::warn, "clients refused",
+              {{"count", *count}, {"last_peer", peer}, {"last_reason", reason.ToString()}});
+  }
+}
+
+Status StreamServer::Impl::check_room(const SessionSettings& wanted) const {
+  if (sessions.size() >= settings.max_sessions) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("all ", settings.max_sessions, " sessions are taken; end one or raise --max-sessions"));
+  }
+  uint64_t taken = 0;
+  for (const auto& [id, entry] : sessions) taken += texels(entry.session->settings());
+  if (taken + texels(wanted) <= settings.max_atlas_texels) return absl::OkStatus();
+  return absl::ResourceExhaustedError(
+      absl::StrCat("the atlases of all sessions have ", taken, " texels and this one would add ",
+                   texels(wanted), " to the ", settings.max_atlas_texels,
+                   " allowed; end a session, take a smaller atlas or raise --max-atlas-mtexels"));
+}
+
 std::shared_ptr<StreamedSession> StreamServer::Impl::take(SessionId id) {
   const std::lock_guard lock(mutex);
   const auto found = sessions.find(id);
   if (found == sessions.end()) return nullptr;
   std::shared_ptr<StreamedSession> session = std::move(found->second.session);
   sessions.erase(found);
+  add_counters(ended_counters, session->stats());
   return session;
 }
 
 Status StreamServer::Impl::end(SessionId id, const Status& reason) {
   const std::shared_ptr<StreamedSession> session = take(id);
-  if (!session) return absl::NotFoundError(absl::StrCat("there is no session ", id));
+  if (!session) return no_such_session(id);
   session->close(reason);
   media->remove_session(id, std::string(reason.message()));
   {
@@ -241,35 +304,60 @@ StreamServer::~StreamServer() {
   s.do_device_work(lock);
 }
 
-StatusOr<SessionTicket> StreamServer::create_session(std::shared_ptr<SharedScene> scene,
+StatusOr<SessionTicket> StreamServer::create_session(RendererFactory renderer,
                                                      const SessionSettings& settings) {
   Impl& s = *impl_;
   SessionTicket ticket{.media_port = media_port(), .meta_port = meta_port()};
   std::array<uint8_t, 8> seed{};
-  TESSERA_RETURN_IF_ERROR(random_bytes(ticket.token).status());
-  TESSERA_RETURN_IF_ERROR(random_bytes(seed).status());
+  TESSERA_RETURN_IF_ERROR(fill_random(ticket.token));
+  TESSERA_RETURN_IF_ERROR(fill_random(seed));
   transport::RtpSenderSettings rtp{.pacer = {.rate_bps = settings.rate.bitrate_bps}};
   std::copy(seed.begin(), seed.end(), reinterpret_cast<uint8_t*>(&rtp.seed));
   TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<transport::RtpSender> sender, transport::RtpSender::create(rtp));
   Entry entry{.token = ticket.token, .ids = sender->ids()};
   if (s.settings.meta.tls) {
     entry.srtp.emplace();
-    TESSERA_RETURN_IF_ERROR(random_bytes(entry.srtp->server).status());
-    TESSERA_RETURN_IF_ERROR(random_bytes(entry.srtp->client).status());
+    TESSERA_RETURN_IF_ERROR(fill_random(entry.srtp->server));
+    TESSERA_RETURN_IF_ERROR(fill_random(entry.srtp->client));
   }
 
   const std::lock_guard lock(s.mutex);
-  if (s.sessions.size() >= s.settings.max_sessions) {
-    return absl::ResourceExhaustedError(absl::StrCat("all ", s.settings.max_sessions,
-                                                     " sessions are taken; end one or raise --max-sessions"));
-  }
+  TESSERA_RETURN_IF_ERROR(s.check_room(settings));
   ticket.session = s.next_id++;
-  entry.session =
-      std::make_shared<StreamedSession>(ticket.session, std::move(scene), settings, s.media, s.clock);
+  entry.session = std::make_shared<StreamedSession>(ticket.session, std::move(renderer), settings, s.media,
+                                                    s.clock, s.settings.on_rendered);
   TESSERA_RETURN_IF_ERROR(s.media->add_session(ticket.session, ticket.token, std::move(sender),
                                                s.media_events(entry.session), entry.srtp));
   s.sessions.emplace(ticket.session, std::move(entry));
   return ticket;
+}
+
+StatusOr<Forwarding> StreamServer::forward(SessionId session, const transport::PeerAddress& to) {
+  Impl& s = *impl_;
+  transport::SdpSettings sdp{.address = transport::to_string(to), .port = to.port, .retransmission = false};
+  {
+    const std::lock_guard lock(s.mutex);
+    const auto found = s.sessions.find(session);
+    if (found == s.sessions.end()) return absl::NotFoundError(absl::StrCat("there is no session ", session));
+    sdp.stream = found->second.ids;
+  }
+  if (s.settings.meta.tls) {
+    sdp.srtp.emplace();
+    TESSERA_RETURN_IF_ERROR(fill_random(*sdp.srtp));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<uint8_t> parameter_sets, s.media->parameter_sets(session));
+  Forwarding forwarding{.session = session};
+  TESSERA_ASSIGN_OR_RETURN(forwarding.sdp, transport::make_sdp(sdp, parameter_sets));
+  TESSERA_ASSIGN_OR_RETURN(forwarding.tap, s.media->add_tap(session, to, sdp.srtp));
+  return forwarding;
+}
+
+void StreamServer::end_forward(const Forwarding& forwarding) {
+  impl_->media->remove_tap(forwarding.session, forwarding.tap);
+}
+
+StatusOr<uint64_t> StreamServer::forwarded_packets(const Forwarding& forwarding) const {
+  return impl_->media->tap_packets(forwarding.session, forwarding.tap);
 }
 
 Status StreamServer::end_session(SessionId session, const std::string& reason) {
@@ -285,18 +373,47 @@ void StreamServer::end_all(const std::string& reason) {
   for (const SessionId id : open) (void)end_session(id, reason);
 }
 
+StatusOr<std::shared_ptr<StreamedSession>> StreamServer::Impl::find(SessionId id) const {
+  const std::lock_guard lock(mutex);
+  const auto found = sessions.find(id);
+  if (found == sessions.end()) return no_such_session(id);
+  return found->second.session;
+}
+
+Status StreamServer::set_rate(SessionId session, double bitrate_bps, double frames_per_second) {
+  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, impl_->find(session));
+  return found->set_rate(bitrate_bps, frames_per_second);
+}
+
 StatusOr<StreamedSessionStats> StreamServer::stats(SessionId session) const {
+  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, impl_->find(session));
+  return found->stats();
+}
+
+StreamServerStats StreamServer::stats() const {
   const std::lock_guard lock(impl_->mutex);
-  const auto found = impl_->sessions.find(session);
-  if (found == impl_->sessions.end())
-    return absl::NotFoundError(absl::StrCat("there is no session ", session));
-  return found->second.session->stats();
+  StreamServerStats stats{.ended = impl_->ended_counters,
+                          .refused_clients = impl_->refused_clients,
+                          .binding = impl_->media->binding_stats(),
+                          .dropped_datagrams = impl_->media->dropped_datagrams()};
+  for (const auto& [id, entry] : impl_->sessions) {
+    stats.sessions.emplace(id, entry.session->stats());
+    stats.atlas_texels += texels(entry.session->settings());
+  }
+  return stats;
+}
+
+StatusOr<std::vector<FrameRecord>> StreamServer::records(SessionId session, uint64_t first,
+                                                         uint64_t& next) const {
+  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, impl_->find(session));
+  return found->records(first, next);
 }
 
 size_t StreamServer::sessions() const {
   const std::lock_guard lock(impl_->mutex);
   return impl_->sessions.size();
 }
+
 Status StreamServer::run_on_device(const std::function<Status()>& work) {
   std::packaged_task<Status()> task(work);
   std::future<Status> result = task.get_future();

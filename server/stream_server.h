@@ -3,12 +3,13 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "base/time.h"
-#include "server/session.h"
+#include "server/frame.h"
 #include "server/streamed_session.h"
 #include "transport/asio/media_port.h"
 #include "transport/asio/meta_listener.h"
@@ -19,14 +20,35 @@ struct StreamServerSettings {
   transport::UdpSocketSettings media;    // port 0: a free one
   transport::MetaListenerSettings meta;  // likewise
   size_t max_sessions = 32;
+  uint64_t max_atlas_texels = 128u << 20;  // of all sessions together
+  StreamedSession::OnRendered on_rendered;
   bool insecure = false;  // allows other addresses than loopback without TLS
 };
+
+// InvalidArgument: an address beyond loopback without TLS and without `insecure`.
+Status check_exposure(const StreamServerSettings& settings);
 
 // What a client needs to connect. The token is a secret.
 struct SessionTicket {
   transport::SessionId session = 0;
   transport::SessionToken token{};
   uint16_t media_port = 0, meta_port = 0;
+};
+
+// A session's video on its way to a plain RTP player as well.
+struct Forwarding {
+  transport::SessionId session = 0;
+  transport::TapId tap = 0;
+  std::string sdp;  // with TLS it holds the key: as secret as the token
+};
+
+struct StreamServerStats {
+  std::map<transport::SessionId, StreamedSessionStats> sessions;
+  StreamedSessionStats ended;  // the counters of sessions that are no more, summed
+  std::map<absl::StatusCode, uint64_t> refused_clients;
+  transport::BindingStats binding;
+  uint64_t dropped_datagrams = 0;  // the socket's queue was full
+  uint64_t atlas_texels = 0;       // of all sessions
 };
 
 // Thread-safe.
@@ -39,13 +61,25 @@ class StreamServer {
   // Tells all clients and waits for its threads.
   ~StreamServer();
 
-  // The session waits for its client; it renders once both its connections stand. All scenes are of one
-  // device. ResourceExhausted: max_sessions.
-  StatusOr<SessionTicket> create_session(std::shared_ptr<SharedScene> scene, const SessionSettings& settings);
+  // The session waits for its client; it renders once both its connections stand. All renderers are of one
+  // device (see renders()). ResourceExhausted: max_sessions, max_atlas_texels.
+  StatusOr<SessionTicket> create_session(RendererFactory renderer, const SessionSettings& settings);
+  // From the next frame on; the client need not connect again. NotFound.
+  Status set_rate(transport::SessionId session, double bitrate_bps, double frames_per_second);
+  // Sends the session's video to `to` as well, encrypted where the session is. NotFound;
+  // FailedPrecondition: no frame was sent yet; ResourceExhausted: MediaPort::kMaxTaps.
+  StatusOr<Forwarding> forward(transport::SessionId session, const transport::PeerAddress& to);
+  void end_forward(const Forwarding& forwarding);
+  // Sent so far. NotFound: the session has ended.
+  StatusOr<uint64_t> forwarded_packets(const Forwarding& forwarding) const;
   // NotFound.
   Status end_session(transport::SessionId session, const std::string& reason);
   void end_all(const std::string& reason);
   StatusOr<StreamedSessionStats> stats(transport::SessionId session) const;
+  // See StreamedSession::records().
+  StatusOr<std::vector<FrameRecord>> records(transport::SessionId session, uint64_t first,
+                                             uint64_t& next) const;
+  StreamServerStats stats() const;
   size_t sessions() const;
 
   // Runs `work` on the render thread, between two frames, and waits for it: a device belongs to one thread.
