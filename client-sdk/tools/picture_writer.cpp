@@ -1,6 +1,7 @@
 #include "client-sdk/tools/picture_writer.h"
 
 #define STB_IMAGE_WRITE_IMPLEMENTATION
+#include <fcntl.h>
 #include <spawn.h>
 #include <stb_image_write.h>
 #include <sys/wait.h>

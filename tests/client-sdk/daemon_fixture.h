@@ -22,6 +22,7 @@ class DaemonFixture : public testing::Test {
     daemon_.reset();
     settings.scenes = {"hall=gallery:0"};
     settings.control_port = settings.meta_port = settings.media_port = 0;
+    settings.no_http = true;
     auto daemon = server::Daemon::start(settings, clock_);
     ASSERT_TRUE(daemon.ok()) << daemon.status();
     daemon_ = *std::move(daemon);

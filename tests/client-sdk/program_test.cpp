@@ -39,9 +39,10 @@ class Program : public DaemonFixture {
     errors_ = text_of(file("err"));
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
-  std::string viewer(const std::string& arguments, const std::string& host = "127.0.0.1") const {
-    return TESSERA_CLIENT " --width 64 --height 48 --seconds 0.2 --control " + host + ":" +
-           std::to_string(daemon_->control_port()) + " " + arguments;
+  std::string viewer(const std::string& arguments, const std::string& host = "127.0.0.1",
+                     int width = 64) const {
+    return TESSERA_CLIENT " --width " + std::to_string(width) + " --height 48 --seconds 0.2 --control " +
+           host + ":" + std::to_string(daemon_->control_port()) + " " + arguments;
   }
   uint64_t sessions() {
     grpc::ClientContext context;
@@ -86,7 +87,7 @@ TEST_F(Program, WritesVideo) {
 
   EXPECT_EQ(run("PATH=/nonexistent " + viewer("--scene hall --out " + file("none.mp4"))), 1);
   EXPECT_THAT(errors_, HasSubstr("install the package ffmpeg"));
-  EXPECT_EQ(run(viewer("--scene hall --out " + file("odd.mp4") + " --width 63")), 1);
+  EXPECT_EQ(run(viewer("--scene hall --out " + file("odd.mp4"), "127.0.0.1", 63)), 1);
   EXPECT_THAT(errors_, HasSubstr("even sides"));
   EXPECT_EQ(run(viewer("--scene hall --out " + file("no/such/folder/hall.mp4"))), 1);
   EXPECT_THAT(errors_, HasSubstr("no/such/folder"));
