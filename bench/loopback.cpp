@@ -9,6 +9,7 @@
 #include "base/log.h"
 #include "bench/coverage_meter.h"
 #include "bench/picture_streamer.h"
+#include "bench/real_loopback.h"
 #include "bench/scoring.h"
 #include "bench/shading_streamer.h"
 #include "bench/stream_simulation.h"
@@ -355,6 +356,8 @@ StatusOr<LoopbackResult> Loopback::run() {
 }  // namespace
 
 StatusOr<LoopbackResult> run_loopback(const LoopbackSettings& settings, Progress& progress) {
+  if (settings.clock == "real") return run_real_loopback(settings, progress);
+  if (settings.sessions != 1) return absl::InvalidArgumentError("--sessions needs --clock real");
   return Loopback(settings, progress).run();
 }
 

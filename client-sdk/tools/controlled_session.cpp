@@ -57,6 +57,14 @@ StatusOr<std::unique_ptr<ControlledSession>> ControlledSession::create(const Con
   return session;
 }
 
+void ControlledSession::record_frames() {
+  reader_ = std::make_unique<FrameReader>(*stub_, id_);
+}
+
+std::vector<FrameRecord> ControlledSession::frames() {
+  return reader_ ? reader_->finish() : std::vector<FrameRecord>();
+}
+
 ControlledSession::~ControlledSession() {
   if (id_ == 0 || kept_) return;
   grpc::ClientContext context;

@@ -3,9 +3,11 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "base/status.h"
 #include "client-sdk/ticket.h"
+#include "proto/frame_reader.h"
 #include "tessera/v1/control.grpc.pb.h"
 
 namespace tessera::client {
@@ -24,6 +26,9 @@ class ControlledSession {
 
   const Ticket& ticket() const { return ticket_; }
   void keep() { kept_ = true; }
+  // From now on, for frames().
+  void record_frames();
+  std::vector<FrameRecord> frames();
 
  private:
   ControlledSession() = default;
@@ -32,6 +37,7 @@ class ControlledSession {
   uint64_t id_ = 0;
   Ticket ticket_;
   bool kept_ = false;
+  std::unique_ptr<FrameReader> reader_;
 };
 
 }  // namespace tessera::client

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <optional>
+#include <utility>
 #include <vector>
 
 extern char** environ;
@@ -23,20 +24,32 @@ class PngFolder final : public PictureWriter {
  public:
   PngFolder(std::string folder, uint32_t save_every) : folder_(std::move(folder)), save_every_(save_every) {}
 
-  Status write(const Image8& picture, uint64_t index) override {
-    if (index % save_every_ != 0) return absl::OkStatus();
-    const std::string file = absl::StrFormat("%s/%06d.png", folder_, index);
-    if (!stbi_write_png(file.c_str(), static_cast<int>(picture.width), static_cast<int>(picture.height), 4,
-                        picture.rgba.data(), static_cast<int>(4 * picture.width)))
-      return absl::UnavailableError(absl::StrCat("cannot write ", file));
-    ++written_;
+  StatusOr<std::string> write(const Image8& picture, uint64_t index) override {
+    if (index % save_every_ != 0) return "";
+    if (waiting_bytes_ + picture.rgba.size() > kMaxWaitingBytes) TESSERA_RETURN_IF_ERROR(finish());
+    std::string file = absl::StrFormat("%s/%06d.png", folder_, index);
+    waiting_.emplace_back(file, picture);
+    waiting_bytes_ += picture.rgba.size();
+    return file;
+  }
+  Status finish() override {
+    for (const auto& [file, picture] : std::exchange(waiting_, {})) {
+      if (!stbi_write_png(file.c_str(), static_cast<int>(picture.width), static_cast<int>(picture.height), 4,
+                          picture.rgba.data(), static_cast<int>(4 * picture.width)))
+        return absl::UnavailableError(absl::StrCat("cannot write ", file));
+      ++written_;
+    }
+    waiting_bytes_ = 0;
     return absl::OkStatus();
   }
   uint64_t written() const override { return written_; }
 
  private:
+  static constexpr size_t kMaxWaitingBytes = 256u << 20;
   std::string folder_;
   uint32_t save_every_;
+  std::vector<std::pair<std::string, Image8>> waiting_;
+  size_t waiting_bytes_ = 0;
   uint64_t written_ = 0;
 };
 
@@ -46,7 +59,7 @@ class Mp4File final : public PictureWriter {
   Mp4File(std::string file, double fps) : file_(std::move(file)), fps_(fps) {}
   ~Mp4File() override { (void)finish(); }
 
-  Status write(const Image8& picture, uint64_t) override {
+  StatusOr<std::string> write(const Image8& picture, uint64_t) override {
     if (pid_ < 0) TESSERA_RETURN_IF_ERROR(start(picture.width, picture.height));
     const uint8_t* next = picture.rgba.data();
     for (size_t left = picture.rgba.size(); left > 0;) {
@@ -57,7 +70,7 @@ class Mp4File final : public PictureWriter {
       left -= static_cast<size_t>(n);
     }
     ++written_;
-    return absl::OkStatus();
+    return file_;
   }
 
   Status finish() override {

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "base/camera_path.h"
+#include "base/frame_trace.h"
 #include "base/log.h"
 #include "client-sdk/connection.h"
 #include "client-sdk/display.h"
@@ -29,7 +30,7 @@ enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 constexpr char kFooter[] = R"(Examples:
   tessera-client --scene hall --seconds 5 --out pictures
   tessera-client --control 127.0.0.1:7310 --scene sponza --path sponza_1.csv --width 1280 --height 720 --save-every 10 --json run.json
-  tessera-client --scene hall --out hall.mp4
+  tessera-client --scene hall --out hall.mp4 --trace hall-trace.json
   tessera-client --control render.example:7310 --ca ca.pem --scene hall --print-ticket
   tessera-client --ticket tessera://127.0.0.1:7311/TOKEN --out pictures
 
@@ -37,7 +38,7 @@ Exit codes: 0 done, 1 the stream failed, 2 wrong usage.)";
 
 struct Settings {
   client::ControlSettings control;
-  std::string scene, ticket, path, out, json;
+  std::string scene, ticket, path, out, json, frames_csv, trace;
   bool print_ticket = false;
   std::vector<double> position{0, 1.6, 0};
   double seconds = 5, fps = 60, fov_y_deg = 60;
@@ -46,6 +47,7 @@ struct Settings {
 
 struct Totals {
   uint64_t displayed = 0, fresh = 0;
+  nlohmann::json saved = nlohmann::json::array();  // what each picture shows
 };
 
 View view_of(const Settings& s) {
@@ -131,12 +133,26 @@ class Viewer {
     }
     if (!pair_) return absl::OkStatus();
     TESSERA_ASSIGN_OR_RETURN(const Image8 image, display_.draw(view_));
+    const TimeNs displayed = clock_.now();
     if (next) {
-      connection_.report_displayed(next->frame, clock_.now());
+      connection_.report_displayed(next->frame, displayed);
       ++totals_.fresh;
     }
-    if (writer_) TESSERA_RETURN_IF_ERROR(writer_->write(image, totals_.displayed));
+    if (writer_) TESSERA_RETURN_IF_ERROR(save(image, displayed));
     ++totals_.displayed;
+    return absl::OkStatus();
+  }
+
+  Status save(const Image8& image, TimeNs displayed) {
+    TESSERA_ASSIGN_OR_RETURN(const std::string file, writer_->write(image, totals_.displayed));
+    if (file.empty()) return absl::OkStatus();
+    const auto& [position, q] = view_.pose;
+    totals_.saved.push_back({{"file", file},
+                             {"index", totals_.displayed},
+                             {"frame", pair_->frame},
+                             {"displayed_ns", displayed},
+                             {"position", {position.x, position.y, position.z}},
+                             {"orientation_xyzw", {q.x, q.y, q.z, q.w}}});
     return absl::OkStatus();
   }
 
@@ -158,6 +174,18 @@ Status print_ticket(const Settings& s) {
   return absl::OkStatus();
 }
 
+Status write_frames(const Settings& s, const std::vector<FrameRecord>& records) {
+  using Write = void (*)(std::span<const FrameRecord>, std::ostream&);
+  for (const auto& [file, write] :
+       {std::pair<std::string, Write>(s.frames_csv, write_csv), {s.trace, write_chrome_trace}}) {
+    if (file.empty()) continue;
+    std::ofstream out(file);
+    write(records, out);
+    if (!out.flush()) return absl::UnavailableError(absl::StrCat("cannot write ", file));
+  }
+  return absl::OkStatus();
+}
+
 StatusOr<nlohmann::json> view(const Settings& s) {
   const SteadyClock clock;
   TESSERA_ASSIGN_OR_RETURN(Head head, Head::create(s));
@@ -173,6 +201,7 @@ StatusOr<nlohmann::json> view(const Settings& s) {
   } else {
     TESSERA_ASSIGN_OR_RETURN(session, client::ControlledSession::create(s.control, s.scene));
     ticket = session->ticket();
+    if (!s.frames_csv.empty() || !s.trace.empty()) session->record_frames();
   }
   TESSERA_ASSIGN_OR_RETURN(const auto connection,
                            client::connect(ticket, client_settings(s), kConnectTimeoutNs, clock));
@@ -181,11 +210,13 @@ StatusOr<nlohmann::json> view(const Settings& s) {
   Viewer viewer(s, std::move(head), *connection, *display, writer.get(), clock);
   TESSERA_RETURN_IF_ERROR(viewer.run());
   if (writer) TESSERA_RETURN_IF_ERROR(writer->finish());
+  if (session) TESSERA_RETURN_IF_ERROR(write_frames(s, session->frames()));
   const client::ConnectionStats stats = connection->stats();
   const Totals& totals = viewer.totals();
   return nlohmann::json{{"frames_displayed", totals.displayed},
                         {"frames_fresh", totals.fresh},
                         {"pictures", writer ? writer->written() : 0},
+                        {"saved", totals.saved},
                         {"network_round_trip_ms", to_ms(stats.round_trip_ns.value_or(0))},
                         {"packets", stats.media.packets},
                         {"packets_recovered", stats.media.recovered},
@@ -240,6 +271,12 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
   app.add_option("--json", s.json, "write what was measured to this file; - for standard output");
+  app.add_option("--frames-csv", s.frames_csv,
+                 "with --scene: a line for every frame, with the times of both ends")
+      ->needs(scene);
+  app.add_option("--trace", s.trace,
+                 "with --scene: the same as a trace for Perfetto or chrome://tracing (JSON)")
+      ->needs(scene);
   app.add_option("--log", log_level, "level on standard error")->capture_default_str();
   try {
     app.parse(argc, argv);
