@@ -36,7 +36,8 @@ Status parse_endpoint(absl::string_view text, Ticket& ticket) {
   const bool brackets = absl::ConsumePrefix(&host, "[") && absl::ConsumeSuffix(&host, "]");
   if (host.empty() || host.find_first_of("[]@/ ") != absl::string_view::npos)
     return wrong("the host is not one");
-  if (!brackets && host.find(':') != absl::string_view::npos) return wrong("an IPv6 address goes in brackets");
+  if (!brackets && host.find(':') != absl::string_view::npos)
+    return wrong("an IPv6 address goes in brackets");
   ticket.host = std::string(host);
   return absl::OkStatus();
 }
