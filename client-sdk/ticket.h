@@ -8,11 +8,11 @@
 // secret.
 #pragma once
 
+#include <absl/strings/string_view.h>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
-#include <absl/strings/string_view.h>
 
 #include "base/status.h"
 #include "base/time.h"
