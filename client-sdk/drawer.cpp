@@ -39,8 +39,15 @@ GLint attachment(GLenum which, GLenum property) {
   return value;
 }
 
+// Whether what is drawn into the bound framebuffer is encoded on its way. With EXT_sRGB_write_control apps
+// may turn that off.
+bool encodes_srgb(GLenum color, bool can_be_off) {
+  if (attachment(color, GL_FRAMEBUFFER_ATTACHMENT_COLOR_ENCODING) != GL_SRGB) return false;
+  return !can_be_off || glIsEnabled(GL_FRAMEBUFFER_SRGB_EXT) == GL_TRUE;
+}
+
 // Of the bound framebuffer; an error says what it lacks.
-StatusOr<gles::TargetKind> kind_of(uint32_t framebuffer, bool needs_depth) {
+StatusOr<gles::TargetKind> kind_of(uint32_t framebuffer, bool needs_depth, bool srgb_write_control) {
   const GLenum status = glCheckFramebufferStatus(GL_DRAW_FRAMEBUFFER);
   if (status != GL_FRAMEBUFFER_COMPLETE)
     return absl::FailedPreconditionError(
@@ -54,8 +61,7 @@ StatusOr<gles::TargetKind> kind_of(uint32_t framebuffer, bool needs_depth) {
         absl::StrFormat("framebuffer %u has no depth: attach a depth buffer", framebuffer));
   GLint samples = 0;
   glGetIntegerv(GL_SAMPLES, &samples);
-  return gles::TargetKind{.multisampled = samples > 1,
-                          .srgb = attachment(color, GL_FRAMEBUFFER_ATTACHMENT_COLOR_ENCODING) == GL_SRGB};
+  return gles::TargetKind{.multisampled = samples > 1, .srgb = encodes_srgb(color, srgb_write_control)};
 }
 
 float linear_from_srgb(float c) {  // IEC 61966-2-1
@@ -74,6 +80,7 @@ void limit_to(int x, int y, uint32_t width, uint32_t height) {
 struct Drawer::Impl {
   std::array<uint8_t, 3> background;
   gles::ClipControl clip_control;
+  bool srgb_write_control;
   gles::AtlasTexture atlas;
   gles::ScenePass scene;
   // Only where a lens was asked for.
@@ -102,8 +109,14 @@ StatusOr<std::unique_ptr<Drawer>> Drawer::create(const std::array<uint8_t, 3>& b
   const gles::StateScope scope(clip_control);
   TESSERA_ASSIGN_OR_RETURN(auto atlas, gles::AtlasTexture::create());
   TESSERA_ASSIGN_OR_RETURN(auto pass, gles::ScenePass::create(clip_control));
-  return std::unique_ptr<Drawer>(new Drawer(
-      std::unique_ptr<Impl>(new Impl{background, clip_control, std::move(atlas), std::move(pass), {}, {}})));
+  return std::unique_ptr<Drawer>(
+      new Drawer(std::unique_ptr<Impl>(new Impl{background,
+                                                clip_control,
+                                                gles::has_extension("GL_EXT_sRGB_write_control"),
+                                                std::move(atlas),
+                                                std::move(pass),
+                                                {},
+                                                {}})));
 }
 
 Status Drawer::set_atlas(const YuvView& atlas) {
@@ -122,7 +135,8 @@ Status Drawer::draw(const View& view, const DrawTarget& target) {
   TESSERA_RETURN_IF_ERROR(check_view(view));
   return impl_->in_scope([&]() -> Status {
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
-    TESSERA_ASSIGN_OR_RETURN(const gles::TargetKind kind, kind_of(target.framebuffer, true));
+    TESSERA_ASSIGN_OR_RETURN(const gles::TargetKind kind,
+                             kind_of(target.framebuffer, true, impl_->srgb_write_control));
     return impl_->draw_scene(view, kind, target.x, target.y);
   });
 }
@@ -163,7 +177,8 @@ Status Drawer::Impl::prepare_lens(uint32_t width, uint32_t height) {
 Status Drawer::Impl::draw_through_lens(const View& view, const DrawTarget& target,
                                        const LensDistortion& lens) {
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
-  TESSERA_ASSIGN_OR_RETURN(const gles::TargetKind kind, kind_of(target.framebuffer, false));
+  TESSERA_ASSIGN_OR_RETURN(const gles::TargetKind kind,
+                           kind_of(target.framebuffer, false, srgb_write_control));
 
   // A lens leaves sizes at its centre as they are, so there the picture has the screen's pixels one to one.
   GLint limit = 0;
@@ -178,7 +193,8 @@ Status Drawer::Impl::draw_through_lens(const View& view, const DrawTarget& targe
   TESSERA_RETURN_IF_ERROR(prepare_lens(picture.width, picture.height));
 
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, before_lens->framebuffer());
-  TESSERA_ASSIGN_OR_RETURN(const gles::TargetKind inner, kind_of(before_lens->framebuffer(), true));
+  TESSERA_ASSIGN_OR_RETURN(const gles::TargetKind inner,
+                           kind_of(before_lens->framebuffer(), true, srgb_write_control));
   TESSERA_RETURN_IF_ERROR(draw_scene(picture, inner, 0, 0));
   glDisable(GL_SCISSOR_TEST);
   before_lens->resolve();

@@ -2,8 +2,6 @@
 
 #include <EGL/egl.h>
 
-#include <string_view>
-
 namespace tessera::client::gles {
 namespace {
 
@@ -25,16 +23,6 @@ StatusOr<Shader> compile(GLenum stage, std::initializer_list<const char*> source
   glGetShaderInfoLog(shader.id(), sizeof(log) - 1, nullptr, log);
   return absl::InternalError(absl::StrCat(
       "glCompileShader of a ", stage == GL_VERTEX_SHADER ? "vertex" : "fragment", " shader failed: ", log));
-}
-
-bool has_extension(std::string_view name) {
-  GLint count = 0;
-  glGetIntegerv(GL_NUM_EXTENSIONS, &count);
-  for (GLint i = 0; i < count; ++i) {
-    const GLubyte* extension = glGetStringi(GL_EXTENSIONS, static_cast<GLuint>(i));
-    if (extension != nullptr && name == reinterpret_cast<const char*>(extension)) return true;
-  }
-  return false;
 }
 
 }  // namespace
@@ -84,6 +72,16 @@ void bind_texture(GLuint unit, const Texture& texture) {
 void set_sampler(const Program& program, const char* name, GLint unit) {
   glUseProgram(program.id());
   glUniform1i(glGetUniformLocation(program.id(), name), unit);
+}
+
+bool has_extension(std::string_view name) {
+  GLint count = 0;
+  glGetIntegerv(GL_NUM_EXTENSIONS, &count);
+  for (GLint i = 0; i < count; ++i) {
+    const GLubyte* extension = glGetStringi(GL_EXTENSIONS, static_cast<GLuint>(i));
+    if (extension != nullptr && name == reinterpret_cast<const char*>(extension)) return true;
+  }
+  return false;
 }
 
 ClipControl find_clip_control() {

@@ -8,6 +8,7 @@
 
 #include <initializer_list>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "base/status.h"
@@ -73,6 +74,7 @@ void set_sampling(const Texture& texture, GLint filter);
 void bind_texture(GLuint unit, const Texture& texture);
 void set_sampler(const Program& program, const char* name, GLint unit);
 
+bool has_extension(std::string_view name);
 // EXT_clip_control's entry, which lets depth run from 0 to 1; null where the driver does not have it.
 using ClipControl = PFNGLCLIPCONTROLEXTPROC;
 ClipControl find_clip_control();

@@ -71,6 +71,11 @@ TEST_F(DrawerTest, AFramebufferThatEncodesItselfGetsTheSamePicture) {
   ASSERT_TRUE(
       drawer_->draw(view, {.framebuffer = framebuffer.id()}, LensDistortion{.screen = view.fov}).ok());
   EXPECT_LE(largest_difference(framebuffer.picture(), reference(view, 4)), 1);
+
+  if (!gles::has_extension("GL_EXT_sRGB_write_control")) return;
+  glDisable(GL_FRAMEBUFFER_SRGB_EXT);
+  ASSERT_TRUE(drawer_->draw(view, {.framebuffer = framebuffer.id()}).ok());
+  EXPECT_EQ(largest_difference(framebuffer.picture(), expected), 0) << "encoding switched off by the app";
 }
 
 TEST_F(DrawerTest, HalvesOfAFramebufferAreTheEyesPictures) {

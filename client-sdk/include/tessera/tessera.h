@@ -109,7 +109,7 @@ typedef struct TesseraPoseInfo { /* TESSERA_TYPE_POSE_INFO */
   TesseraStructureType type;
   const void* next;
   TesseraPose pose;
-  int64_t predictedDisplayTime; /* when this pose is expected to be true: later than in the call before */
+  int64_t predictedDisplayTime; /* when the pose is expected to be true: later than in the call before */
 } TesseraPoseInfo;
 
 typedef enum TesseraEventKind {
@@ -235,8 +235,8 @@ TESSERA_API TesseraResult tesseraDestroyRenderer(TesseraRenderer renderer);
  * background while there is none (TESSERA_FRAME_UNAVAILABLE). Without a lens a framebuffer needs a depth
  * buffer, whose contents in the viewport are lost; it may be multisampled. Framebuffers that encode sRGB
  * themselves get the same picture. Bindings and state of the context are afterwards as they were. Transform
- * feedback must not be active. TESSERA_ERROR_CALL_ORDER: a framebuffer is incomplete or lacks what it needs.
- */
+ * feedback must not be active. After an error the viewports may hold anything. TESSERA_ERROR_CALL_ORDER: a
+ * framebuffer is incomplete or lacks what it needs. */
 TESSERA_API TesseraResult tesseraDraw(TesseraRenderer renderer, const TesseraDrawInfo* info);
 
 #ifdef __cplusplus
