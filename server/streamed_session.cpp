@@ -28,6 +28,7 @@ StreamedSession::StreamedSession(transport::SessionId id, RendererFactory make_r
 
 Status StreamedSession::admit(const transport::ClientSettings& client) {
   const std::lock_guard lock(mutex_);
+  if (closed_) return absl::NotFoundError(absl::StrCat("session ", id_, " has ended"));
   if (admitted_) {
     return absl::FailedPreconditionError(
         absl::StrCat("session ", id_, " has a client already; create a session for each client"));
@@ -40,8 +41,16 @@ Status StreamedSession::admit(const transport::ClientSettings& client) {
 }
 
 void StreamedSession::on_connected(std::shared_ptr<transport::MetaConnection> connection) {
-  const std::lock_guard lock(mutex_);
-  connection_ = std::move(connection);
+  Status reason;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!closed_) {
+      connection_ = std::move(connection);
+      return;
+    }
+    reason = *closed_;
+  }
+  connection->close(reason);
 }
 
 void StreamedSession::on_closed(const Status& reason) {
@@ -131,6 +140,7 @@ void StreamedSession::close(const Status& reason) {
   std::shared_ptr<transport::MetaConnection> connection;
   {
     const std::lock_guard lock(mutex_);
+    closed_ = reason;
     connection = std::exchange(connection_, nullptr);
   }
   if (connection) connection->close(reason);

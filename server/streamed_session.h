@@ -40,9 +40,9 @@ class StreamedSession {
   void on_pose(const transport::SequencedPose& pose);
   void on_key_frame_request();
   Status on_frame(transport::FrameType type, std::span<const uint8_t> payload);
-  // FailedPrecondition: a client is connected already.
+  // FailedPrecondition: a client is connected already. NotFound: close() was called.
   Status admit(const transport::ClientSettings& client);
-  // Tells the client; it sends nothing any more.
+  // Tells the client, also one that is just connecting; it sends nothing any more.
   void close(const Status& reason);
 
   // Both connections stand and a pose is there.
@@ -94,6 +94,7 @@ class StreamedSession {
   std::deque<FrameRecord> records_;
   uint64_t first_record_ = 0;  // number of records_.front()
   bool admitted_ = false, bound_ = false, key_frame_wanted_ = false, restart_ = false;
+  std::optional<Status> closed_;  // why
   TimeNs due_ns_ = 0;
   StreamedSessionStats stats_;
 };
