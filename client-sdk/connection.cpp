@@ -128,6 +128,7 @@ Status Connection::Impl::open_media() {
   media_settings.receiver.rtx_payload_type = welcome.stream.rtx_payload_type;
   media_settings.receiver.ssrc = welcome.stream.ssrc;
   media_settings.receiver.rtx_ssrc = welcome.stream.rtx_ssrc;
+  media_settings.receiver.first_sequence = welcome.stream.first_sequence;
   auto client = transport::MediaClient::open(
       asio::make_strand(io), media_settings, clock,
       {.on_bound = [this](DurationNs) { opened(absl::OkStatus()); },

@@ -13,6 +13,12 @@ constexpr DurationNs kFirstRoundTripNs = 100 * kNsPerMs;  // assumed before the 
 constexpr DurationNs kMaxRoundTripNs = kNsPerSecond;
 constexpr size_t kMaxFramesInFlight = 256;
 
+// The media port says so when the client has just left, or its address went to another session: no error of
+// the frame.
+bool left(const Status& status) {
+  return absl::IsNotFound(status) || absl::IsFailedPrecondition(status);
+}
+
 }  // namespace
 
 StreamedSession::StreamedSession(transport::SessionId id, RendererFactory make_renderer,
@@ -66,6 +72,12 @@ void StreamedSession::on_closed(const Status& reason) {
 void StreamedSession::on_bound() {
   const std::lock_guard lock(mutex_);
   bound_ = true;
+}
+
+Status StreamedSession::on_unbound() {
+  const std::lock_guard lock(mutex_);
+  bound_ = false;  // until its next hello
+  return absl::OkStatus();
 }
 
 void StreamedSession::on_pose(const transport::SequencedPose& pose) {
@@ -183,8 +195,10 @@ Status StreamedSession::render() {
     settings.client_view = work.client_view;
     TESSERA_ASSIGN_OR_RETURN(renderer_, make_renderer_(settings));
   }
-  TESSERA_ASSIGN_OR_RETURN(const double budget, media_->frame_budget_bits(id_, period_ns(), work.key_frame));
-  if (budget <= 0) {  // frames are dropped before they are encoded, never after
+  const StatusOr<double> budget = media_->frame_budget_bits(id_, period_ns(), work.key_frame);
+  if (left(budget.status())) return on_unbound();
+  if (!budget.ok()) return budget.status();
+  if (*budget <= 0) {  // frames are dropped before they are encoded, never after
     if (work.key_frame) on_key_frame_request();
     put_off();
     const std::lock_guard lock(mutex_);
@@ -216,8 +230,9 @@ Status StreamedSession::send(const Work& work, const Frame& frame, FrameRecord r
   record.server.encode = from_ms(times.encode_ms);
   // A client that left meanwhile is no error of this frame: on_closed() tells.
   if (!work.connection->send(FrameType::meta, frame.meta).ok()) return absl::OkStatus();
-  const auto sent =
+  const StatusOr<uint32_t> sent =
       media_->send_frame(id_, record.server.render_begin, frame.atlas.bytes, frame.atlas.key_frame);
+  if (left(sent.status())) return on_unbound();
   record.server.sent = clock_.now();
   on_sent(record);
   if (!absl::IsResourceExhausted(sent.status())) return sent.status();

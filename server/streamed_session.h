@@ -69,6 +69,7 @@ class StreamedSession {
     TimeNs pose_received_ns = 0, due_ns = 0;
     bool key_frame = false;
   };
+  Status on_unbound();
   Status on_timing(std::span<const uint8_t> payload);
   Status answer_ping(std::span<const uint8_t> payload);
   Work take_work();

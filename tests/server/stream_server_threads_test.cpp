@@ -59,6 +59,21 @@ TEST_F(StreamServerThreadsTest, ClientsComeAndGo) {
   EXPECT_EQ(server_->sessions(), 0u);
 }
 
+// Nothing of the stream before is left: neither keys and numbers nor what waited in queues.
+TEST_F(StreamServerThreadsTest, EveryClientHasAStreamOfItsOwn) {
+  start();
+  const SessionTicket mine = ticket();
+  transport::StreamIds before{};
+  for (int visit = 0; visit < 5; ++visit) {
+    const auto client = connect_again(mine);
+    ASSERT_TRUE(client);
+    EXPECT_NE(client->welcome().stream, before);
+    before = client->welcome().stream;
+    expect_pairs(*client, 2);
+    EXPECT_EQ(client->stats().core.decode_errors, 0u);
+  }
+}
+
 // Whoever of the two is first, the client hears of it, and the server forgets it.
 TEST_F(StreamServerThreadsTest, SessionsEndWhileTheirClientsConnect) {
   start();
