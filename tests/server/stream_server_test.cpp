@@ -304,6 +304,38 @@ TEST_F(StreamServerTest, ScenesComeAndGoWhileSessionsRun) {
   EXPECT_TRUE(absl::IsUnknown(server_->run_on_device([] { return absl::UnknownError("as it is"); })));
 }
 
+// R12: the scene lies on the device once, however many look at it.
+TEST_F(StreamServerTest, FourSessionsShareOneSceneAndTheDevice) {
+  start();
+  const auto memory = [&] {
+    uint64_t bytes = 0;
+    EXPECT_TRUE(server_
+                    ->run_on_device([&] {
+                      bytes = device_->memory_in_use();
+                      return absl::OkStatus();
+                    })
+                    .ok());
+    return static_cast<double>(bytes);
+  };
+  const SessionTicket before = ticket();  // what the scene makes only when it is first drawn
+  frames_of({before}, 3);
+  EXPECT_TRUE(server_->end_session(before.session, "").ok());
+  const double none = memory();
+  const SessionTicket first = ticket();
+  frames_of({first}, 3);
+  const double one = memory();
+  std::vector<SessionTicket> four{first, ticket(), ticket(), ticket()};
+  const std::vector<uint64_t> frames = frames_of(four, 10);
+  const double session = one - none;
+  EXPECT_GT(session, 0);
+  EXPECT_NEAR(memory() - one, 3 * session, 0.02 * session);
+  const auto [least, most] = std::ranges::minmax(frames);
+  EXPECT_GE(least, 10u);
+  EXPECT_LE(static_cast<double>(most), 1.15 * static_cast<double>(least));
+  for (const SessionTicket& ticket : four) EXPECT_TRUE(server_->end_session(ticket.session, "").ok());
+  EXPECT_EQ(memory(), none);
+}
+
 TEST_F(StreamServerTest, SessionsAreLimited) {
   start({.max_sessions = 2});
   ticket();

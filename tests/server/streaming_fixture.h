@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <thread>
+#include <vector>
 
 #include "client-sdk/connection.h"
 #include "fake_renderer.h"
@@ -76,6 +78,32 @@ class StreamingTest : public testing::Test {
       return ++seen == count;
     }));
     EXPECT_EQ(seen, count) << client.status();
+  }
+
+  // Frames sent to each session, once all have streamed and then the slowest has got `count` more.
+  std::vector<uint64_t> frames_of(const std::vector<SessionTicket>& tickets, uint64_t count) {
+    std::vector<std::unique_ptr<client::Connection>> clients;
+    for (const SessionTicket& ticket : tickets) {
+      auto client = connect(ticket);
+      EXPECT_TRUE(client.ok()) << client.status();
+      if (!client.ok()) return {};
+      clients.push_back(*std::move(client));
+    }
+    std::vector<uint64_t> begin;
+    std::vector<uint64_t> frames(tickets.size());
+    const TimeNs give_up = clock_.now() + kPatienceNs;
+    while (clock_.now() < give_up && *std::ranges::min_element(frames) < count) {
+      std::vector<uint64_t> sent;
+      for (size_t i = 0; i < clients.size(); ++i) {
+        clients[i]->send_pose({clock_.now(), {}});
+        if (const client::Pair* pair = clients[i]->take_newest()) check(*pair);
+        sent.push_back(server_->stats(tickets[i].session)->frames_sent);
+      }
+      if (begin.empty() && *std::ranges::min_element(sent) > 0) begin = sent;
+      for (size_t i = 0; i < begin.size(); ++i) frames[i] = sent[i] - begin[i];
+      std::this_thread::sleep_for(std::chrono::nanoseconds(kDisplayNs));
+    }
+    return frames;
   }
 
   SteadyClock clock_;
