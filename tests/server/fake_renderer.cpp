@@ -54,8 +54,12 @@ gc::MetaFrame scene(const FakeRendererSettings& s, uint32_t width, uint32_t heig
     meta.objects.resize(s.moving_objects);
     meta.patches = {{.triangles = 2, .vertices = {0, 1, 2, 3}}};
   }
-  for (uint32_t object = 0; object < s.moving_objects; ++object)
-    meta.moved.push_back({object, {.translation = {static_cast<double>(number), 0, 0}}});
+  std::minstd_rand random(number + 1);
+  for (uint32_t object = 0; object < s.moving_objects; ++object) {
+    gc::Transform transform{.translation = {static_cast<double>(number), 0, 0}};
+    for (float& value : transform.linear) value = static_cast<float>(random()) * 0x1p-30f;
+    meta.moved.push_back({object, transform});
+  }
   meta.placements = {{.kind = gc::PlacementKind::block, .x = block_x(number), .log_w = 1, .log_h = 1}};
   return meta;
 }

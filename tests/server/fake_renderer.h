@@ -12,7 +12,7 @@ namespace tessera::server::test {
 
 struct FakeRendererSettings {
   DurationNs render_time_ns = 0;  // that a frame takes beside its encoding
-  uint32_t moving_objects = 1;    // at least 1; each is some 60 bytes of every meta packet
+  uint32_t moving_objects = 1;    // at least 1; each is some 40 bytes of every meta packet
 };
 
 // The atlas of SessionSettings::layout, at least 256x32.
