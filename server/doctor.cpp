@@ -42,8 +42,8 @@ Detail check_scene(const std::string& option) {
   TESSERA_ASSIGN_OR_RETURN(const auto scene, name_and_source(option));
   if (scene::is_procedural(scene.second)) return scene.second;
   if (std::ifstream(scene.second).good() && !fs::is_directory(scene.second)) return scene.second;
-  return absl::NotFoundError(
-      absl::StrCat("cannot read ", scene.second, ": check the path and who may read it (the daemon's user must)"));
+  return absl::NotFoundError(absl::StrCat("cannot read ", scene.second,
+                                          ": check the path and who may read it (the daemon's user must)"));
 }
 
 Detail check_scene_root(const std::string& root) {

@@ -10,8 +10,8 @@
 namespace tessera::server {
 
 struct Finding {
-  std::string check;  // one of a fixed list, e.g. "control port"
-  Status status;      // says what to do
+  std::string check;   // one of a fixed list, e.g. "control port"
+  Status status;       // says what to do
   std::string detail;  // of what is well, e.g. the device's name
 };
 

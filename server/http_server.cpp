@@ -18,9 +18,9 @@ namespace {
 
 namespace asio = transport::asio;
 namespace http = boost::beast::http;
+using asio::ip::tcp;
 using transport::ByteStream;
 using transport::SystemError;
-using asio::ip::tcp;
 
 constexpr auto kAcceptRetry = std::chrono::seconds(1);  // e.g. out of file descriptors
 
@@ -29,7 +29,11 @@ class Exchange : public std::enable_shared_from_this<Exchange> {
  public:
   Exchange(std::unique_ptr<ByteStream> stream, const HttpServerSettings& settings,
            const HttpServer::Handler& handler, std::function<void(Exchange*)> done)
-      : stream_(std::move(stream)), handler_(handler), done_(std::move(done)), timer_(stream_->executor()), in_(settings.max_header_bytes + 1) {
+      : stream_(std::move(stream)),
+        handler_(handler),
+        done_(std::move(done)),
+        timer_(stream_->executor()),
+        in_(settings.max_header_bytes + 1) {
     parser_.header_limit(settings.max_header_bytes);
     parser_.body_limit(std::numeric_limits<uint64_t>::max());  // no body is read
     timer_.expires_after(std::chrono::nanoseconds(settings.timeout_ns));
@@ -40,9 +44,8 @@ class Exchange : public std::enable_shared_from_this<Exchange> {
     timer_.async_wait([weak = weak_from_this()](SystemError error) {
       if (const auto self = weak.lock(); self && !error) self->close();
     });
-    stream_->async_handshake([self = shared_from_this()](SystemError error) {
-      error ? self->close() : self->read();
-    });
+    stream_->async_handshake(
+        [self = shared_from_this()](SystemError error) { error ? self->close() : self->read(); });
   }
   void close() {
     timer_.cancel();

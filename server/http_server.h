@@ -1,4 +1,5 @@
-// A small HTTP/1.1 server for an operator's tools: GET and HEAD, one request a connection, bounded in every way.
+// A small HTTP/1.1 server for an operator's tools: GET and HEAD, one request a connection, bounded in every
+// way.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +15,8 @@
 namespace tessera::server {
 
 struct HttpServerSettings {
-  std::string address = "127.0.0.1";  // in numbers
-  uint16_t port = 0;                  // 0: a free one
+  std::string address = "127.0.0.1";           // in numbers
+  uint16_t port = 0;                           // 0: a free one
   std::shared_ptr<transport::TlsContext> tls;  // empty: clear text
   size_t max_connections = 32;                 // more are closed at once
   uint32_t max_header_bytes = 8192;            // of a request; a longer one gets 431

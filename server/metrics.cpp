@@ -21,7 +21,8 @@ constexpr double kMib = 1 << 20;
 
 // Of counters or gauges, taken from elsewhere at the time of the scrape.
 struct Family : MetricFamily {
-  Family(MetricType kind, const char* family, const char* meaning) : MetricFamily{family, meaning, kind, {}} {}
+  Family(MetricType kind, const char* family, const char* meaning)
+      : MetricFamily{family, meaning, kind, {}} {}
   template <class Value>
   Family& add(Value value, Labels labels = {}) {
     ClientMetric& sample = metric.emplace_back();
@@ -67,7 +68,8 @@ void add_streams(const StreamServerStats& s, std::vector<MetricFamily>& out) {
   out.push_back(gauge("tesserad_clients_connected", "Sessions whose client is connected.").add(connected));
   out.push_back(gauge("tesserad_atlas_texels", "Texels of all sessions' atlases.").add(s.atlas_texels));
   using Stats = StreamedSessionStats;
-  total("tesserad_frames_sent_total", "Frames rendered and sent.", [](const Stats& x) { return x.frames_sent; });
+  total("tesserad_frames_sent_total", "Frames rendered and sent.",
+        [](const Stats& x) { return x.frames_sent; });
   total("tesserad_frames_skipped_total", "Frames given up before rendering, as the network was behind.",
         [](const Stats& x) { return x.frames_skipped; });
   total("tesserad_key_frames_total", "Key frames among the frames sent.",
@@ -83,13 +85,13 @@ void add_streams(const StreamServerStats& s, std::vector<MetricFamily>& out) {
         [](const Stats& x) { return x.media.packets; });
   total("tesserad_packets_retransmitted_total", "RTP packets sent again.",
         [](const Stats& x) { return x.media.retransmitted; });
-  out.push_back(counter("tesserad_dropped_datagrams_total", "UDP datagrams that were dropped, by reason.")
-                    .add(s.binding.unknown_address, {{"reason", "unknown_address"}})
-                    .add(s.binding.bad_token, {{"reason", "bad_token"}})
-                    .add(s.binding.malformed, {{"reason", "malformed"}})
-                    .add(sum(s, [](const Stats& x) { return x.media.malformed_rtcp; }),
-                         {{"reason", "malformed_rtcp"}})
-                    .add(s.dropped_datagrams, {{"reason", "send_queue_full"}}));
+  out.push_back(
+      counter("tesserad_dropped_datagrams_total", "UDP datagrams that were dropped, by reason.")
+          .add(s.binding.unknown_address, {{"reason", "unknown_address"}})
+          .add(s.binding.bad_token, {{"reason", "bad_token"}})
+          .add(s.binding.malformed, {{"reason", "malformed"}})
+          .add(sum(s, [](const Stats& x) { return x.media.malformed_rtcp; }), {{"reason", "malformed_rtcp"}})
+          .add(s.dropped_datagrams, {{"reason", "send_queue_full"}}));
 }
 
 void add_each_session(const StreamServerStats& s, std::vector<MetricFamily>& out) {
@@ -104,7 +106,8 @@ void add_each_session(const StreamServerStats& s, std::vector<MetricFamily>& out
        [](const Stats& x) { return x.bitrate_bps; });
   each(gauge("tesserad_session_round_trip_seconds", "From a pose to the picture that shows its frame."),
        [](const Stats& x) { return to_seconds(x.round_trip_ns); });
-  each(gauge("tesserad_session_loss_ratio", "Packets lost before retransmission, as the client last reported."),
+  each(gauge("tesserad_session_loss_ratio",
+             "Packets lost before retransmission, as the client last reported."),
        [](const Stats& x) { return x.peer ? x.peer->loss : 0; });
   each(counter("tesserad_session_frames_sent_total", "Frames rendered and sent, by session."),
        [](const Stats& x) { return x.frames_sent; });
@@ -114,7 +117,8 @@ void add_each_session(const StreamServerStats& s, std::vector<MetricFamily>& out
 
 void add_refusals(const StreamServerStats& s, const ControlService::Refusals& calls,
                   std::vector<MetricFamily>& out) {
-  Family family = counter("tesserad_refusals_total", "Calls and clients that were refused, by call and reason.");
+  Family family =
+      counter("tesserad_refusals_total", "Calls and clients that were refused, by call and reason.");
   for (const auto& [key, count] : calls)
     family.add(count, {{"call", key.first}, {"reason", code_name(key.second)}});
   for (const auto& [code, count] : s.refused_clients)
@@ -135,13 +139,15 @@ struct Metrics::Impl {
   explicit Impl(const v1::ServerInfo& i) : info(i) {}
 
   prometheus::Histogram& stage(const char* name) {
-    return stages.Add({{"stage", name}}, prometheus::Histogram::BucketBoundaries{
-                                             0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.033, 0.066, 0.13, 0.26, 1});
+    return stages.Add({{"stage", name}},
+                      prometheus::Histogram::BucketBoundaries{0.0005, 0.001, 0.002, 0.004, 0.008, 0.016,
+                                                              0.033, 0.066, 0.13, 0.26, 1});
   }
   void add_server(std::vector<MetricFamily>& out) const;
 
   const v1::ServerInfo info;
-  const double start = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  const double start =
+      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
   prometheus::Registry registry;
   prometheus::Family<prometheus::Histogram>& stages = prometheus::BuildHistogram()
                                                           .Name("tesserad_render_stage_seconds")
@@ -152,14 +158,16 @@ struct Metrics::Impl {
 };
 
 void Metrics::Impl::add_server(std::vector<MetricFamily>& out) const {
-  out.push_back(gauge("tesserad_build_info", "1, labelled with what runs.")
-                    .add(1, {{"version", info.version()}, {"device", info.device()}, {"encoder", info.encoder()}}));
+  out.push_back(
+      gauge("tesserad_build_info", "1, labelled with what runs.")
+          .add(1, {{"version", info.version()}, {"device", info.device()}, {"encoder", info.encoder()}}));
   const v1::Limits& limits = info.limits();
-  out.push_back(gauge("tesserad_limit", "What the daemon's options allow, in the unit of their name; 0: no limit.")
-                    .add(limits.max_sessions(), {{"option", "max-sessions"}})
-                    .add(limits.max_atlas_mtexels(), {{"option", "max-atlas-mtexels"}})
-                    .add(limits.max_scene_mib(), {{"option", "max-scene-mib"}})
-                    .add(limits.max_watchers(), {{"option", "max-watchers"}}));
+  out.push_back(
+      gauge("tesserad_limit", "What the daemon's options allow, in the unit of their name; 0: no limit.")
+          .add(limits.max_sessions(), {{"option", "max-sessions"}})
+          .add(limits.max_atlas_mtexels(), {{"option", "max-atlas-mtexels"}})
+          .add(limits.max_scene_mib(), {{"option", "max-scene-mib"}})
+          .add(limits.max_watchers(), {{"option", "max-watchers"}}));
   // These two have the names that every Prometheus client gives them.
   out.push_back(gauge("process_start_time_seconds", "Start of the process since the epoch.").add(start));
   out.push_back(gauge("process_resident_memory_bytes", "Resident memory.").add(resident_bytes()));

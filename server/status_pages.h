@@ -1,4 +1,5 @@
-// What an operator's tools read over HTTP: /healthz (the process lives), /readyz (it takes sessions), /metrics.
+// What an operator's tools read over HTTP: /healthz (the process lives), /readyz (it takes sessions),
+// /metrics.
 #pragma once
 
 #include <atomic>

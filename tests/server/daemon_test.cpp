@@ -123,7 +123,8 @@ TEST_F(DaemonTest, TheViewerProgramWritesPictures) {
 
 TEST_F(DaemonTest, ABusyControlPortIsNamed) {
   start();
-  DaemonSettings settings{.control_port = daemon_->control_port(), .meta_port = 0, .media_port = 0, .http_port = 0};
+  DaemonSettings settings{
+      .control_port = daemon_->control_port(), .meta_port = 0, .media_port = 0, .http_port = 0};
   const auto second = Daemon::start(settings, clock_);
   ASSERT_FALSE(second.ok());
   EXPECT_NE(std::string(second.status().message()).find(std::to_string(settings.control_port)),

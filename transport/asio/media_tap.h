@@ -1,5 +1,5 @@
-// A second receiver of a session's video: a player that speaks RTP but knows nothing of sessions. It gets each
-// packet once, and the sender reports; it is not listened to.
+// A second receiver of a session's video: a player that speaks RTP but knows nothing of sessions. It gets
+// each packet once, and the sender reports; it is not listened to.
 #pragma once
 
 #include <cstdint>
