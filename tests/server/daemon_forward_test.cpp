@@ -1,5 +1,5 @@
-// Players that know nothing of Tessera show a session's atlas from the SDP that the daemon gives: their pictures are
-// the very ones that our client decodes.
+// Players that know nothing of Tessera show a session's atlas from the SDP that the daemon gives: their
+// pictures are the very ones that our client decodes.
 #include <gmock/gmock.h>
 
 #include <deque>
@@ -153,11 +153,12 @@ TEST_F(Forward, GStreamerPlaysTheDaemonsStream) {
   ASSERT_TRUE(std::regex_search(forwarding.sdp(), media, std::regex("m=video (\\d+) RTP/AVP (\\d+)")));
   ASSERT_TRUE(std::regex_search(forwarding.sdp(), sets, std::regex("sprop-parameter-sets=([^;\r]+)")));
   ChildProcess gst(
-      absl::StrCat("gst-launch-1.0 -q udpsrc address=127.0.0.1 port=", media[1].str(),
-                   " caps=application/x-rtp,media=video,clock-rate=90000,encoding-name=H264,payload=",
-                   media[2].str(), ",sprop-parameter-sets=(string)\"", sets[1].str(), "\"",
-                   " ! rtph264depay ! avdec_h264 ! video/x-raw,format=I420 ! identity eos-after=",
-                   kPictures + 1, " ! filesink location=", folder_.file("out.yuv")),
+      absl::StrCat(
+          "gst-launch-1.0 -q udpsrc address=127.0.0.1 port=", media[1].str(),
+          " caps=application/x-rtp,media=video,clock-rate=90000,encoding-name=H264,payload=", media[2].str(),
+          ",sprop-parameter-sets=(string)\"", sets[1].str(), "\"",
+          " ! rtph264depay ! avdec_h264 ! video/x-raw,format=I420 ! identity eos-after=", kPictures + 1,
+          " ! filesink location=", folder_.file("out.yuv")),
       folder_.file("log"));
   EXPECT_EQ(watch_until_end(gst), 0) << log();
   expect_our_pictures(folder_.file("out.yuv"));

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "../transport/certificate.h"
 #include "daemon_fixture.h"
 #include "http_client.h"
 #include "server/doctor.h"
@@ -214,6 +215,22 @@ TEST_F(Operation, DoctorNamesEachFaultAndNoOther) {
   const auto findings = examine(s);
   EXPECT_THAT(failed(findings), testing::ElementsAre("configuration"));
   EXPECT_THAT(std::string(findings[0].status.message()), HasSubstr("/no/such/file.pem"));
+}
+
+TEST_F(Operation, DoctorReadsCertificates) {
+  const transport::test::Certificate good("localhost"), other("localhost"), old("localhost", -60);
+  DaemonSettings s{.address = "0.0.0.0", .control_port = 0, .meta_port = 0, .media_port = 0, .http_port = 0};
+  s.tls_certificate = good.certificate_file();
+  EXPECT_THAT(failed(examine(s)), testing::ElementsAre("configuration")) << "no key";
+  s.tls_key = other.key_file();
+  EXPECT_THAT(failed(examine(s)), testing::ElementsAre("configuration")) << "another's key";
+  s.tls_key = good.key_file();
+  EXPECT_THAT(failed(examine(s)), testing::IsEmpty());
+  s.tls_certificate = old.certificate_file();
+  s.tls_key = old.key_file();
+  const auto findings = examine(s);
+  EXPECT_THAT(failed(findings), testing::ElementsAre("configuration"));
+  EXPECT_THAT(std::string(findings[0].status.message()), HasSubstr("expired"));
 }
 
 // tesserad doctor and its exit codes.

@@ -45,7 +45,8 @@ TEST_F(Deploy, TheExampleConfigurationIsWhatTheDaemonPrints) {
   EXPECT_TRUE(text_of(kDeploy / "tesserad.toml").ends_with(commented))
       << "make it anew; its first lines say how. It should end with:\n"
       << commented;
-  EXPECT_EQ(run(std::string(TESSERAD) + " --check-config --config " + (kDeploy / "tesserad.toml").string()), 0);
+  EXPECT_EQ(run(std::string(TESSERAD) + " --check-config --config " + (kDeploy / "tesserad.toml").string()),
+            0);
 }
 
 // Every metric in the dashboard exists, labels in legends do too, and rates are taken of counters alone.
@@ -76,8 +77,7 @@ TEST_F(Deploy, TheDashboardShowsMetricsThatExist) {
       const std::regex label("\\{\\{(\\w+)\\}\\}");
       for (std::sregex_iterator i(legend.begin(), legend.end(), label), end; i != end; ++i) {
         if ((*i)[1] == "instance") continue;  // Prometheus adds it
-        EXPECT_THAT(metrics, HasSubstr((*i)[1].str() + "=\""))
-            << legend;
+        EXPECT_THAT(metrics, HasSubstr((*i)[1].str() + "=\"")) << legend;
       }
     }
   }
