@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/log.h"
+
 namespace tessera::server {
 namespace {
 
@@ -206,6 +208,13 @@ Status StreamedSession::render() {
                                                                 .key_frame = work.key_frame}));
   put_off(true, number, frame.pose.time_ns);
   count(frame);
+  log_event(spdlog::level::debug, "frame rendered",
+            {{"session", id_},
+             {"frame", number},
+             {"key_frame", frame.atlas.key_frame},
+             {"atlas_bytes", frame.atlas.bytes.size()},
+             {"meta_bytes", frame.meta.size()},
+             {"render_ms", frame.stats.times.total_ms()}});
   if (on_rendered_) on_rendered_(frame.stats);
   // A client that left meanwhile is no error of this frame: on_closed() tells.
   if (!work.connection->send(FrameType::meta, frame.meta).ok()) return absl::OkStatus();

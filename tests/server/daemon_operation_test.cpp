@@ -7,6 +7,7 @@
 #include "../transport/certificate.h"
 #include "daemon_fixture.h"
 #include "http_client.h"
+#include "server/control_service.h"
 #include "server/doctor.h"
 
 namespace tessera::server {
@@ -51,6 +52,29 @@ TEST_F(Operation, PagesTellOfReadinessAndOfWhatRuns) {
   EXPECT_EQ(metric("tesserad_sessions"), 0);
   EXPECT_EQ(metric("tesserad_limit{option=\"max-sessions\"}"), 7);
   EXPECT_GT(metric("process_resident_memory_bytes"), 1e6);
+}
+
+// As the daemon does while its scenes load and while it drains.
+TEST_F(Operation, NothingNewIsLetInBeforeAndAfterItServes) {
+  auto device = gpu::Device::create({.select = "cpu"});
+  ASSERT_TRUE(device.ok()) << device.status();
+  auto streams = StreamServer::create({}, clock_);
+  ASSERT_TRUE(streams.ok()) << streams.status();
+  SceneLibrary scenes(*device, **streams, "", 0);
+  ASSERT_TRUE(scenes.load_trusted("hall", "gallery:0").ok());
+  ControlService control(**streams, scenes, {});
+  v1::CreateSessionRequest request;
+  request.set_scene("hall");
+  v1::Ticket ticket;
+  const auto create = [&] { return control.CreateSession(nullptr, &request, &ticket); };
+  expect_refused(create(), StatusCode::UNAVAILABLE, "loading");
+  control.open();
+  EXPECT_TRUE(create().ok());
+  control.drain();
+  expect_refused(create(), StatusCode::UNAVAILABLE, "shutting down");
+  v1::LoadSceneRequest load;
+  v1::Scene scene;
+  expect_refused(control.LoadScene(nullptr, &load, &scene), StatusCode::UNAVAILABLE, "shutting down");
 }
 
 TEST_F(Operation, ServerInfoNamesDeviceEncoderAndLimits) {

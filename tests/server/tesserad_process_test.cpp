@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
 #include "daemon_fixture.h"
 #include "http_client.h"
 
@@ -110,11 +112,44 @@ TEST_F(Process, JsonLogsAreJsonFromTheFirstLineToTheLast) {
   EXPECT_TRUE(serving);
 }
 
+// Neither at the most talkative level, nor of clients that are refused.
+TEST_F(Process, TokensAreNotLogged) {
+  run("--log trace --scene hall=gallery:0" + kFreePorts);
+  ASSERT_TRUE(logged("serving")) << log();
+  control_ = v1::Control::NewStub(grpc::CreateChannel(absl::StrCat("127.0.0.1:", port_in_log("control_port")),
+                                                      grpc::InsecureChannelCredentials()));
+  v1::Ticket ticket;
+  ASSERT_TRUE(create("hall", &ticket).ok());
+  const std::string right = ticket.token();
+  auto client = connect(ticket);
+  ASSERT_TRUE(client.ok()) << client.status();
+  ticket.mutable_token()->back() ^= 1;
+  EXPECT_FALSE(connect(ticket).ok());
+  ASSERT_TRUE(logged("clients refused")) << log();
+  child_->signal(SIGTERM);
+  EXPECT_EQ(exit_code(), 0);
+  std::string text = log();
+  EXPECT_THAT(text, HasSubstr("client connected"));
+  const std::string start = right.substr(0, 8);  // of both tokens
+  EXPECT_EQ(text.find(start), text.npos);
+  EXPECT_EQ(text.find(absl::Base64Escape(right).substr(0, 8)), text.npos);
+  absl::AsciiStrToLower(&text);
+  EXPECT_EQ(text.find(absl::BytesToHexString(start)), text.npos);
+}
+
 TEST_F(Process, WrongUsageIsTwo) {
   run("--no-such-option");
   EXPECT_EQ(exit_code(), 2);
   run("--max-sessions 0");
   EXPECT_EQ(exit_code(), 2);
+  for (const char* wrong :
+       {"--address 0.0.0.0", "--address localhost", "--scene hall", "--tls-key key.pem"}) {
+    run(wrong + kFreePorts);
+    EXPECT_EQ(exit_code(), 2) << wrong;
+    run(std::string("--check-config ") + wrong);
+    EXPECT_EQ(exit_code(), 2) << wrong;
+    EXPECT_EQ(std::ranges::count(log(), '\n'), 1) << log();
+  }
   run("--version");
   EXPECT_EQ(exit_code(), 0);
   EXPECT_THAT(log(), HasSubstr(version()));
