@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/log.h"
+
 namespace tessera::server {
 namespace {
 
@@ -248,6 +250,13 @@ Status StreamedSession::render() {
   record.server.render_end = clock_.now();
   put_off();
   count(frame);
+  log_event(spdlog::level::debug, "frame rendered",
+            {{"session", id_},
+             {"frame", frame.number},
+             {"key_frame", frame.atlas.key_frame},
+             {"atlas_bytes", frame.atlas.bytes.size()},
+             {"meta_bytes", frame.meta.size()},
+             {"render_ms", frame.stats.times.total_ms()}});
   if (on_rendered_) on_rendered_(frame.stats);
   return send(work, frame, record);
 }

@@ -46,6 +46,10 @@ std::optional<int> ChildProcess::exit_code() {
   return exit_code_;
 }
 
+void ChildProcess::signal(int number) {
+  if (!exit_code()) kill(pid_, number);
+}
+
 ChildProcess::~ChildProcess() {
   if (exit_code()) return;
   kill(pid_, SIGKILL);

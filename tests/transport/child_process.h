@@ -21,6 +21,7 @@ class ChildProcess {
 
   // Its exit code (128 + signal) once it has ended.
   std::optional<int> exit_code();
+  void signal(int number);
 
  private:
   pid_t pid_ = -1;

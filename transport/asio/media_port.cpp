@@ -85,8 +85,11 @@ void MediaPort::log_dropped() {
   const auto count = drop_log_.event(clock_.now());
   if (!count) return;
   const BindingStats& s = binding_.stats();
-  spdlog::info("media port: dropped {} datagrams (in all: unknown address {}, wrong token {}, malformed {})",
-               *count, s.unknown_address, s.bad_token, s.malformed);
+  log_event(spdlog::level::info, "datagrams dropped",
+            {{"count", *count},
+             {"all_unknown_address", s.unknown_address},
+             {"all_bad_token", s.bad_token},
+             {"all_malformed", s.malformed}});
 }
 
 void MediaPort::handle(const RoutedDatagram& routed, std::span<const uint8_t> datagram, Calls& calls) {
