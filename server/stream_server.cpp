@@ -364,7 +364,7 @@ StatusOr<Forwarding> StreamServer::forward(SessionId session, const transport::P
   const std::optional<transport::StreamIds> ids = s.media->stream_ids(session);
   if (!ids) {
     return absl::FailedPreconditionError(
-        absl::StrCat("session ", session, " has no client, so there is no stream: connect one first"));
+        absl::StrCat("session ", session, " has no client, so there is no stream: connect its client first"));
   }
   sdp.stream = *ids;
   if (s.settings.meta.tls) {
