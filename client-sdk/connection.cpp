@@ -273,7 +273,7 @@ Connection::~Connection() {
 }
 
 void Connection::send_pose(const TimedPose& pose) {
-  const transport::SequencedPose sequenced{impl_->pose_sequence++, pose};
+  const transport::SequencedPose sequenced{impl_->pose_sequence++, pose, impl_->clock.now()};
   if (!impl_->media->send_pose(sequenced))
     (void)impl_->meta->send(FrameType::pose, transport::encode(sequenced));
 }
