@@ -174,10 +174,10 @@ StatusOr<std::vector<Packet>> ShadingStreamer::serve(const ServeRequest& request
 }
 
 Status ShadingStreamer::deliver(Channel channel, std::span<const uint8_t> bytes) {
-  if (channel == Channel::meta) return impl_->core->on_meta(bytes);
+  if (channel == Channel::meta) return impl_->core->on_meta(bytes).status();
   // Late or missing pictures are part of a network: the core counts them and asks for a key frame.
-  if (const Status status = impl_->core->on_atlas(bytes); !status.ok())
-    spdlog::debug("client: {}", status.ToString());
+  if (const auto frame = impl_->core->on_atlas(bytes); !frame.ok())
+    spdlog::debug("client: {}", frame.status().ToString());
   return absl::OkStatus();
 }
 

@@ -38,7 +38,7 @@ StatusOr<std::unique_ptr<ClientCore>> ClientCore::create() {
   return std::unique_ptr<ClientCore>(new ClientCore(std::make_unique<Impl>(std::move(decoder))));
 }
 
-Status ClientCore::on_atlas(std::span<const uint8_t> access_unit) {
+StatusOr<FrameNumber> ClientCore::on_atlas(std::span<const uint8_t> access_unit) {
   auto decoded = impl_->decoder->decode(access_unit);
   // After a failure the decoder refuses everything up to the next key frame.
   impl_->wants_key_frame.store(!decoded.ok(), std::memory_order_relaxed);
@@ -49,10 +49,11 @@ Status ClientCore::on_atlas(std::span<const uint8_t> access_unit) {
   }
   if (!status.ok()) ++impl_->decode_errors;
   impl_->publish_stats();
-  return status;
+  if (!status.ok()) return status;
+  return decoded->frame;
 }
 
-Status ClientCore::on_meta(std::span<const uint8_t> packet) {
+StatusOr<FrameNumber> ClientCore::on_meta(std::span<const uint8_t> packet) {
   Status status;
   if (const std::string error = geometry_compression::decode(packet, impl_->meta); !error.empty()) {
     status = absl::InvalidArgumentError(absl::StrCat("meta packet of ", packet.size(), " bytes: ", error));
@@ -63,7 +64,8 @@ Status ClientCore::on_meta(std::span<const uint8_t> packet) {
   }
   if (!status.ok()) ++impl_->decode_errors;
   impl_->publish_stats();
-  return status;
+  if (!status.ok()) return status;
+  return impl_->meta.frame;
 }
 
 bool ClientCore::wants_key_frame() const {

@@ -42,11 +42,12 @@ class ClientCore {
   static StatusOr<std::unique_ptr<ClientCore>> create();
   ~ClientCore();
 
-  // One whole H.264 access unit. An error is counted and returned, and leaves the core usable.
-  Status on_atlas(std::span<const uint8_t> access_unit);
+  // One whole H.264 access unit; the frame that it belongs to. An error is counted and returned, and leaves
+  // the core usable.
+  StatusOr<FrameNumber> on_atlas(std::span<const uint8_t> access_unit);
   // One whole meta packet. Packets must come in frame order (the channel is reliable); a damaged one is an
   // error that ends the session's state until a packet with full_state.
-  Status on_meta(std::span<const uint8_t> packet);
+  StatusOr<FrameNumber> on_meta(std::span<const uint8_t> packet);
   // True from a broken video chain until the next key frame has been decoded.
   bool wants_key_frame() const;
 

@@ -3,12 +3,14 @@
 #include <atomic>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/thread_pool.hpp>
 #include <future>
 #include <mutex>
 #include <thread>
 #include <utility>
 
 #include "base/log.h"
+#include "client-sdk/frame_times.h"
 #include "transport/asio/media_client.h"
 #include "transport/asio/meta_client.h"
 #include "transport/clock_offset.h"
@@ -19,7 +21,10 @@ namespace {
 namespace asio = transport::asio;
 using transport::FrameType;
 
-constexpr DurationNs kPingIntervalNs = kNsPerSecond;
+// The first pings come fast, for an offset of the clocks before the first picture.
+constexpr DurationNs kPingIntervalNs = kNsPerSecond, kFirstPingIntervalNs = 50 * kNsPerMs;
+constexpr uint32_t kFirstPings = 8;
+constexpr size_t kMaxUndecodedBytes = 32u << 20;
 
 }  // namespace
 
@@ -28,18 +33,25 @@ struct Connection::Impl {
       : settings(s), clock(c), work(io.get_executor()), ping_timer(io) {}
 
   Status open();
-  StatusOr<std::shared_ptr<transport::MetaConnection>> open_meta();
+  Status open_meta();
   Status open_media();
   void close();
   Status on_frame(FrameType type, std::span<const uint8_t> payload);
-  void on_access_unit(const transport::ReceivedFrame& frame);
+  Status on_meta(std::span<const uint8_t> packet);
+  void on_access_unit(transport::ReceivedFrame frame);
+  void decode_meta(const std::vector<uint8_t>& packet, TimeNs complete);
+  void decode_atlas(const transport::ReceivedFrame& frame);
+  // False: the decoder is too far behind.
+  bool reserve(size_t bytes);
+  void report(FrameNumber frame, TimeNs draw_begin, TimeNs displayed);
+  void request_key_frame();
   void ping();
   void end(const Status& reason);
 
   const ConnectionSettings settings;
   const Clock& clock;
   std::unique_ptr<ClientCore> core;
-  asio::io_context io{1};  // run by one thread: the core's receiving side
+  asio::io_context io{1};  // run by one thread, which never waits for a decoder
   asio::executor_work_guard<asio::io_context::executor_type> work;
   asio::steady_timer ping_timer;
   std::shared_ptr<transport::MetaConnection> meta;  // set once, before the media client opens
@@ -48,11 +60,15 @@ struct Connection::Impl {
   std::atomic<uint32_t> pose_sequence = 0;
   uint32_t ping_id = 0;  // the receiving thread's, as is
   bool closing = false;
+  TimeNs draw_begin = 0;                   // the drawing thread's
+  std::atomic<size_t> undecoded_bytes{0};  // that wait for the decoder
+  FrameTimes times;                        // the decoder's, with the core's receiving side
 
   mutable std::mutex mutex;  // of all below
   transport::ClockOffset offset;
   Status ended;
   std::thread thread;
+  asio::thread_pool decoder{1};  // last: its thread uses all of the above
 };
 
 void Connection::Impl::end(const Status& reason) {
@@ -63,15 +79,14 @@ void Connection::Impl::end(const Status& reason) {
 Status Connection::Impl::open() {
   TESSERA_ASSIGN_OR_RETURN(core, ClientCore::create());
   thread = std::thread([this] { io.run(); });
-  TESSERA_ASSIGN_OR_RETURN(meta, open_meta());
+  TESSERA_RETURN_IF_ERROR(open_meta());
   TESSERA_RETURN_IF_ERROR(open_media());
   asio::post(io, [this] { ping(); });
   return absl::OkStatus();
 }
 
-StatusOr<std::shared_ptr<transport::MetaConnection>> Connection::Impl::open_meta() {
-  using Result = StatusOr<std::shared_ptr<transport::MetaConnection>>;
-  const auto done = std::make_shared<std::promise<Result>>();
+Status Connection::Impl::open_meta() {
+  const auto done = std::make_shared<std::promise<Status>>();
   transport::MetaClientSettings meta_settings{.server_address = settings.server_address,
                                               .server_port = settings.meta_port,
                                               .tls = settings.tls,
@@ -83,9 +98,11 @@ StatusOr<std::shared_ptr<transport::MetaConnection>> Connection::Impl::open_meta
       {.on_frame = [this](FrameType type,
                           std::span<const uint8_t> payload) { return on_frame(type, payload); },
        .on_closed = [this](const Status& reason) { end(reason); }},
-      [this, done](Result connection, const transport::Welcome& answer) {
+      [this, done](StatusOr<std::shared_ptr<transport::MetaConnection>> connection,
+                   const transport::Welcome& answer) {
         welcome = answer;
-        done->set_value(std::move(connection));
+        if (connection.ok()) meta = *connection;  // before its first frame
+        done->set_value(connection.status());
       });
   return done->get_future().get();
 }
@@ -108,7 +125,7 @@ Status Connection::Impl::open_media() {
   auto opened = transport::MediaClient::open(
       asio::make_strand(io), media_settings, clock,
       {.on_bound = [tell](DurationNs) { tell(absl::OkStatus()); },
-       .on_frame = [this](transport::ReceivedFrame frame) { on_access_unit(frame); },
+       .on_frame = [this](transport::ReceivedFrame frame) { on_access_unit(std::move(frame)); },
        .on_failed =
            [this, tell](const Status& status) {
              tell(status);
@@ -124,10 +141,7 @@ Status Connection::Impl::open_media() {
 
 Status Connection::Impl::on_frame(FrameType type, std::span<const uint8_t> payload) {
   const TimeNs now = clock.now();
-  if (type == FrameType::meta) {
-    // A damaged packet over a reliable channel is a broken peer.
-    return core->on_meta(payload);
-  }
+  if (type == FrameType::meta) return on_meta(payload);
   if (type == FrameType::pong) {
     TESSERA_ASSIGN_OR_RETURN(const transport::ClockPong pong, transport::decode_pong(payload));
     const std::lock_guard lock(mutex);
@@ -138,12 +152,63 @@ Status Connection::Impl::on_frame(FrameType type, std::span<const uint8_t> paylo
       absl::StrCat("frame of type ", static_cast<int>(type), " is not the server's to send"));
 }
 
-void Connection::Impl::on_access_unit(const transport::ReceivedFrame& frame) {
-  if (frame.complete) {
-    if (const Status status = core->on_atlas(frame.access_unit); !status.ok())
-      spdlog::debug("client: {}", status.ToString());
+bool Connection::Impl::reserve(size_t bytes) {
+  if (undecoded_bytes + bytes > kMaxUndecodedBytes) return false;
+  undecoded_bytes += bytes;
+  return true;
+}
+
+Status Connection::Impl::on_meta(std::span<const uint8_t> packet) {
+  if (!reserve(packet.size())) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("this client decodes too slowly: ", kMaxUndecodedBytes >> 20, " MiB wait"));
   }
-  if (!core->wants_key_frame()) return;
+  asio::post(decoder, [this, complete = clock.now(), copy = std::vector(packet.begin(), packet.end())] {
+    decode_meta(copy, complete);
+    undecoded_bytes -= copy.size();
+  });
+  return absl::OkStatus();
+}
+
+void Connection::Impl::decode_meta(const std::vector<uint8_t>& packet, TimeNs complete) {
+  const TimeNs begin = clock.now();
+  const StatusOr<FrameNumber> frame = core->on_meta(packet);
+  if (!frame.ok()) {  // a damaged packet over a reliable channel is a broken peer
+    end(frame.status());
+    meta->close(frame.status());
+    return;
+  }
+  ClientFrameTimes& t = times.of(*frame);
+  t.meta_complete = complete;
+  t.meta_decode_begin = begin;
+  t.meta_decoded = clock.now();
+}
+
+void Connection::Impl::on_access_unit(transport::ReceivedFrame frame) {
+  // The decoder sees by the units' references that one is missing.
+  if (!frame.complete || !reserve(frame.access_unit.size())) return request_key_frame();
+  asio::post(decoder, [this, frame = std::move(frame)] {
+    decode_atlas(frame);
+    undecoded_bytes -= frame.access_unit.size();
+  });
+}
+
+void Connection::Impl::decode_atlas(const transport::ReceivedFrame& received) {
+  const TimeNs begin = clock.now();
+  const StatusOr<FrameNumber> frame = core->on_atlas(received.access_unit);
+  if (core->wants_key_frame()) request_key_frame();
+  if (!frame.ok()) {
+    spdlog::debug("client: {}", frame.status().ToString());
+    return;
+  }
+  ClientFrameTimes& t = times.of(*frame);
+  t.atlas_first_packet = received.first_packet_ns;
+  t.atlas_complete = received.last_packet_ns;
+  t.atlas_decode_begin = begin;
+  t.atlas_decoded = clock.now();
+}
+
+void Connection::Impl::request_key_frame() {
   std::shared_ptr<transport::MediaClient> to;
   {
     const std::lock_guard lock(mutex);
@@ -152,10 +217,27 @@ void Connection::Impl::on_access_unit(const transport::ReceivedFrame& frame) {
   if (to) to->request_key_frame();
 }
 
+void Connection::Impl::report(FrameNumber frame, TimeNs drawn, TimeNs displayed) {
+  std::vector<ClientFrameTimes> taken = times.take_up_to(frame);
+  std::optional<DurationNs> clock_offset, round_trip;
+  {
+    const std::lock_guard lock(mutex);
+    clock_offset = offset.offset_ns();
+    round_trip = offset.round_trip_ns();
+  }
+  for (ClientFrameTimes& t : taken) {
+    if (t.frame == frame) t.draw_begin = drawn, t.displayed = displayed;
+    t.clock_offset = clock_offset.value_or(0);
+    t.clock_error = clock_offset ? *round_trip / 2 : -1;
+  }
+  if (!taken.empty()) (void)meta->send(FrameType::timing, transport::encode(taken));
+}
+
 void Connection::Impl::ping() {
   if (closing || meta->closed()) return;
   (void)meta->send(FrameType::ping, transport::encode(transport::ClockPing{++ping_id, clock.now()}));
-  ping_timer.expires_after(std::chrono::nanoseconds(kPingIntervalNs));
+  ping_timer.expires_after(
+      std::chrono::nanoseconds(ping_id < kFirstPings ? kFirstPingIntervalNs : kPingIntervalNs));
   ping_timer.async_wait([this](transport::SystemError error) {
     if (!error) ping();
   });
@@ -183,6 +265,8 @@ Connection::~Connection() {
   impl_->close();
   impl_->work.reset();  // the thread ends when the bye is out, or close_timeout_ns is
   if (impl_->thread.joinable()) impl_->thread.join();
+  impl_->decoder.stop();  // what waits for it is of no use any more
+  impl_->decoder.join();
 }
 
 void Connection::send_pose(const TimedPose& pose) {
@@ -192,12 +276,16 @@ void Connection::send_pose(const TimedPose& pose) {
 }
 
 const Pair* Connection::take_newest() {
-  return impl_->core->take_newest();
+  const Pair* pair = impl_->core->take_newest();
+  if (pair) impl_->draw_begin = impl_->clock.now();
+  return pair;
 }
 
 void Connection::report_displayed(FrameNumber frame, TimeNs displayed_ns) {
-  const transport::FrameTiming timing{.frame = frame, .displayed = displayed_ns};
-  (void)impl_->meta->send(FrameType::timing, transport::encode(std::span(&timing, 1)));
+  // Behind what the decoder still has to note of this frame.
+  asio::post(impl_->decoder, [impl = impl_.get(), frame, drawn = impl_->draw_begin, displayed_ns] {
+    impl->report(frame, drawn, displayed_ns);
+  });
 }
 
 Status Connection::status() const {

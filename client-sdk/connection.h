@@ -31,8 +31,8 @@ struct ConnectionStats {
   std::optional<DurationNs> clock_offset_ns;  // the server's clock minus ours
 };
 
-// Owns the thread that receives and decodes. take_newest() and report_displayed() belong to one drawing
-// thread, as in ClientCore; the rest may be called from any thread.
+// Owns a thread that receives and one that decodes. take_newest() and report_displayed() belong to one
+// drawing thread, as in ClientCore; the rest may be called from any thread.
 class Connection {
  public:
   // Blocks until both connections stand, or one has failed; the error names the step (connect, TLS, hello,
@@ -43,9 +43,10 @@ class Connection {
 
   // Newest wins; `pose.time_ns` on this side's clock, increasing.
   void send_pose(const TimedPose& pose);
-  // See ClientCore::take_newest().
+  // See ClientCore::take_newest(). Counts as the moment at which drawing begins.
   const Pair* take_newest();
-  // The moment at which a pair's first picture was shown. The server predicts by it.
+  // The moment at which the first picture of the pair taken last was shown. The server predicts by it. All
+  // that is known of this frame, and of those that it replaced, goes to the server (base/frame_record.h).
   void report_displayed(FrameNumber frame, TimeNs displayed_ns);
 
   // OK while the session runs; then why it ended.

@@ -7,10 +7,14 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_replace.h"
 #include "base/log.h"
+#include "proto/frame_record.h"
+#include "server/session.h"
 #include "transport/asio/endpoint.h"
 
 namespace tessera::server {
 namespace {
+
+constexpr uint32_t kFramesIntervalMs = 50;  // of frame records
 
 grpc::Status to_grpc(const Status& status) {
   // The codes have the same numbers.
@@ -181,7 +185,7 @@ grpc::Status ControlService::CreateSession(grpc::ServerContext*, const v1::Creat
   if (!settings.ok()) return answer("CreateSession", settings.status());
   StatusOr<std::shared_ptr<SharedScene>> scene = scenes_.find(request->scene());
   if (!scene.ok()) return answer("CreateSession", scene.status());
-  const StatusOr<SessionTicket> ticket = server_.create_session(*std::move(scene), *settings);
+  const StatusOr<SessionTicket> ticket = server_.create_session(renders(*std::move(scene)), *settings);
   if (!ticket.ok()) return answer("CreateSession", ticket.status());
   {
     const std::lock_guard lock(mutex_);
@@ -308,6 +312,29 @@ grpc::Status ControlService::WatchSession(grpc::ServerContext* context,
                                           const v1::WatchSessionRequest* request,
                                           grpc::ServerWriter<v1::Session>* writer) {
   return answer("WatchSession", watch(context, *request, *writer));
+}
+
+Status ControlService::watch_frames(grpc::ServerContext* context, const v1::WatchFramesRequest& request,
+                                    grpc::ServerWriter<v1::FrameRecord>& writer) {
+  TESSERA_ASSIGN_OR_RETURN(const auto watcher, Watcher::admit(*this));
+  uint64_t next = request.first();
+  do {
+    TESSERA_ASSIGN_OR_RETURN(const std::vector<FrameRecord> records,
+                             server_.records(request.session(), next, next));
+    uint64_t index = next - records.size();
+    for (const FrameRecord& record : records) {
+      v1::FrameRecord message;
+      write(record, message);
+      message.set_index(index++);
+      if (!writer.Write(message)) return absl::OkStatus();
+    }
+  } while (!request.once() && wait(kFramesIntervalMs) && !context->IsCancelled());
+  return absl::OkStatus();
+}
+
+grpc::Status ControlService::WatchFrames(grpc::ServerContext* context, const v1::WatchFramesRequest* request,
+                                         grpc::ServerWriter<v1::FrameRecord>* writer) {
+  return answer("WatchFrames", watch_frames(context, *request, *writer));
 }
 
 // To nowhere but the caller's own address: else whoever reaches this port could flood any other.

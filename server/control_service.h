@@ -45,6 +45,8 @@ class ControlService final : public v1::Control::Service {
                              v1::DeleteSessionResponse*) override;
   grpc::Status WatchSession(grpc::ServerContext*, const v1::WatchSessionRequest*,
                             grpc::ServerWriter<v1::Session>*) override;
+  grpc::Status WatchFrames(grpc::ServerContext*, const v1::WatchFramesRequest*,
+                           grpc::ServerWriter<v1::FrameRecord>*) override;
   grpc::Status ForwardStream(grpc::ServerContext*, const v1::ForwardStreamRequest*,
                              grpc::ServerWriter<v1::Forwarding>*) override;
 
@@ -60,6 +62,8 @@ class ControlService final : public v1::Control::Service {
   Status update(uint64_t session, const v1::SessionSettings& wanted);
   Status watch(grpc::ServerContext* context, const v1::WatchSessionRequest& request,
                grpc::ServerWriter<v1::Session>& writer);
+  Status watch_frames(grpc::ServerContext* context, const v1::WatchFramesRequest& request,
+                      grpc::ServerWriter<v1::FrameRecord>& writer);
   Status forward(grpc::ServerContext* context, const v1::ForwardStreamRequest& request,
                  grpc::ServerWriter<v1::Forwarding>& writer);
   // False: the daemon drains.

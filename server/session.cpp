@@ -186,6 +186,13 @@ StatusOr<Frame> Session::render(const FrameInput& input) {
   return frame;
 }
 
+RendererFactory renders(std::shared_ptr<SharedScene> scene) {
+  return [scene =
+              std::move(scene)](const SessionSettings& settings) -> StatusOr<std::unique_ptr<FrameRenderer>> {
+    return Session::create(scene, settings);
+  };
+}
+
 const FramePlan& Session::plan() const {
   return impl_->plan;
 }

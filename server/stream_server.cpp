@@ -23,10 +23,14 @@ namespace asio = transport::asio;
 using transport::SessionId;
 using transport::SessionToken;
 
-StatusOr<uint64_t> random_bytes(std::span<uint8_t> out) {
+Status fill_random(std::span<uint8_t> out) {
   if (RAND_bytes(out.data(), static_cast<int>(out.size())) != 1)
     return absl::InternalError("RAND_bytes: no random numbers to be had");
-  return out.size();
+  return absl::OkStatus();
+}
+
+Status no_such_session(SessionId id) {
+  return absl::NotFoundError(absl::StrCat("there is no session ", id));
 }
 
 void add_counters(StreamedSessionStats& sum, const StreamedSessionStats& s) {
@@ -78,7 +82,7 @@ struct StreamServer::Impl {
   transport::MediaSessionEvents media_events(const std::shared_ptr<StreamedSession>& session);
   Status check_room(const SessionSettings& wanted) const;
   void refuse(const Status& reason, const std::string& peer);
-  std::shared_ptr<StreamedSession> find(SessionId id) const;
+  StatusOr<std::shared_ptr<StreamedSession>> find(SessionId id) const;
   std::shared_ptr<StreamedSession> take(SessionId id);
   Status end(SessionId id, const Status& reason);
 
@@ -249,12 +253,6 @@ Status StreamServer::Impl::check_room(const SessionSettings& wanted) const {
                    " allowed; end a session, take a smaller atlas or raise --max-atlas-mtexels"));
 }
 
-std::shared_ptr<StreamedSession> StreamServer::Impl::find(SessionId id) const {
-  const std::lock_guard lock(mutex);
-  const auto found = sessions.find(id);
-  return found == sessions.end() ? nullptr : found->second.session;
-}
-
 std::shared_ptr<StreamedSession> StreamServer::Impl::take(SessionId id) {
   const std::lock_guard lock(mutex);
   const auto found = sessions.find(id);
@@ -267,7 +265,7 @@ std::shared_ptr<StreamedSession> StreamServer::Impl::take(SessionId id) {
 
 Status StreamServer::Impl::end(SessionId id, const Status& reason) {
   const std::shared_ptr<StreamedSession> session = take(id);
-  if (!session) return absl::NotFoundError(absl::StrCat("there is no session ", id));
+  if (!session) return no_such_session(id);
   session->close(reason);
   media->remove_session(id, std::string(reason.message()));
   {
@@ -306,27 +304,27 @@ StreamServer::~StreamServer() {
   s.do_device_work(lock);
 }
 
-StatusOr<SessionTicket> StreamServer::create_session(std::shared_ptr<SharedScene> scene,
+StatusOr<SessionTicket> StreamServer::create_session(RendererFactory renderer,
                                                      const SessionSettings& settings) {
   Impl& s = *impl_;
   SessionTicket ticket{.media_port = media_port(), .meta_port = meta_port()};
   std::array<uint8_t, 8> seed{};
-  TESSERA_RETURN_IF_ERROR(random_bytes(ticket.token).status());
-  TESSERA_RETURN_IF_ERROR(random_bytes(seed).status());
+  TESSERA_RETURN_IF_ERROR(fill_random(ticket.token));
+  TESSERA_RETURN_IF_ERROR(fill_random(seed));
   transport::RtpSenderSettings rtp{.pacer = {.rate_bps = settings.rate.bitrate_bps}};
   std::copy(seed.begin(), seed.end(), reinterpret_cast<uint8_t*>(&rtp.seed));
   TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<transport::RtpSender> sender, transport::RtpSender::create(rtp));
   Entry entry{.token = ticket.token, .ids = sender->ids()};
   if (s.settings.meta.tls) {
     entry.srtp.emplace();
-    TESSERA_RETURN_IF_ERROR(random_bytes(entry.srtp->server).status());
-    TESSERA_RETURN_IF_ERROR(random_bytes(entry.srtp->client).status());
+    TESSERA_RETURN_IF_ERROR(fill_random(entry.srtp->server));
+    TESSERA_RETURN_IF_ERROR(fill_random(entry.srtp->client));
   }
 
   const std::lock_guard lock(s.mutex);
   TESSERA_RETURN_IF_ERROR(s.check_room(settings));
   ticket.session = s.next_id++;
-  entry.session = std::make_shared<StreamedSession>(ticket.session, std::move(scene), settings, s.media,
+  entry.session = std::make_shared<StreamedSession>(ticket.session, std::move(renderer), settings, s.media,
                                                     s.clock, s.settings.on_rendered);
   TESSERA_RETURN_IF_ERROR(s.media->add_session(ticket.session, ticket.token, std::move(sender),
                                                s.media_events(entry.session), entry.srtp));
@@ -345,7 +343,7 @@ StatusOr<Forwarding> StreamServer::forward(SessionId session, const transport::P
   }
   if (s.settings.meta.tls) {
     sdp.srtp.emplace();
-    TESSERA_RETURN_IF_ERROR(random_bytes(*sdp.srtp).status());
+    TESSERA_RETURN_IF_ERROR(fill_random(*sdp.srtp));
   }
   TESSERA_ASSIGN_OR_RETURN(const std::vector<uint8_t> parameter_sets, s.media->parameter_sets(session));
   Forwarding forwarding{.session = session};
@@ -375,15 +373,20 @@ void StreamServer::end_all(const std::string& reason) {
   for (const SessionId id : open) (void)end_session(id, reason);
 }
 
+StatusOr<std::shared_ptr<StreamedSession>> StreamServer::Impl::find(SessionId id) const {
+  const std::lock_guard lock(mutex);
+  const auto found = sessions.find(id);
+  if (found == sessions.end()) return no_such_session(id);
+  return found->second.session;
+}
+
 Status StreamServer::set_rate(SessionId session, double bitrate_bps, double frames_per_second) {
-  const auto found = impl_->find(session);
-  if (!found) return absl::NotFoundError(absl::StrCat("there is no session ", session));
+  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, impl_->find(session));
   return found->set_rate(bitrate_bps, frames_per_second);
 }
 
 StatusOr<StreamedSessionStats> StreamServer::stats(SessionId session) const {
-  const auto found = impl_->find(session);
-  if (!found) return absl::NotFoundError(absl::StrCat("there is no session ", session));
+  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, impl_->find(session));
   return found->stats();
 }
 
@@ -400,10 +403,17 @@ StreamServerStats StreamServer::stats() const {
   return stats;
 }
 
+StatusOr<std::vector<FrameRecord>> StreamServer::records(SessionId session, uint64_t first,
+                                                         uint64_t& next) const {
+  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, impl_->find(session));
+  return found->records(first, next);
+}
+
 size_t StreamServer::sessions() const {
   const std::lock_guard lock(impl_->mutex);
   return impl_->sessions.size();
 }
+
 Status StreamServer::run_on_device(const std::function<Status()>& work) {
   std::packaged_task<Status()> task(work);
   std::future<Status> result = task.get_future();

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/time.h"
-#include "server/session.h"
+#include "server/frame.h"
 #include "server/streamed_session.h"
 #include "transport/asio/media_port.h"
 #include "transport/asio/meta_listener.h"
@@ -61,9 +61,9 @@ class StreamServer {
   // Tells all clients and waits for its threads.
   ~StreamServer();
 
-  // The session waits for its client; it renders once both its connections stand. All scenes are of one
-  // device. ResourceExhausted: max_sessions, max_atlas_texels.
-  StatusOr<SessionTicket> create_session(std::shared_ptr<SharedScene> scene, const SessionSettings& settings);
+  // The session waits for its client; it renders once both its connections stand. All renderers are of one
+  // device (see renders()). ResourceExhausted: max_sessions, max_atlas_texels.
+  StatusOr<SessionTicket> create_session(RendererFactory renderer, const SessionSettings& settings);
   // From the next frame on; the client need not connect again. NotFound.
   Status set_rate(transport::SessionId session, double bitrate_bps, double frames_per_second);
   // Sends the session's video to `to` as well, encrypted where the session is. NotFound;
@@ -76,6 +76,9 @@ class StreamServer {
   Status end_session(transport::SessionId session, const std::string& reason);
   void end_all(const std::string& reason);
   StatusOr<StreamedSessionStats> stats(transport::SessionId session) const;
+  // See StreamedSession::records().
+  StatusOr<std::vector<FrameRecord>> records(transport::SessionId session, uint64_t first,
+                                             uint64_t& next) const;
   StreamServerStats stats() const;
   size_t sessions() const;
 

@@ -18,7 +18,7 @@ constexpr DurationNs kRateWindowNs = kNsPerSecond;
 
 }  // namespace
 
-StreamedSession::StreamedSession(transport::SessionId id, std::shared_ptr<SharedScene> scene,
+StreamedSession::StreamedSession(transport::SessionId id, RendererFactory make_renderer,
                                  const SessionSettings& settings, std::shared_ptr<transport::MediaPort> media,
                                  const Clock& clock, OnRendered on_rendered)
     : id_(id),
@@ -26,7 +26,7 @@ StreamedSession::StreamedSession(transport::SessionId id, std::shared_ptr<Shared
       clock_(clock),
       settings_(settings),
       on_rendered_(std::move(on_rendered)),
-      scene_(std::move(scene)),
+      make_renderer_(std::move(make_renderer)),
       rate_(settings.rate) {
   stats_.round_trip_ns = kFirstRoundTripNs;
 }
@@ -53,6 +53,7 @@ void StreamedSession::on_closed(const Status& reason) {
   const std::lock_guard lock(mutex_);
   connection_.reset();
   poses_.clear();
+  under_way_.clear();
   admitted_ = bound_ = false;
   restart_ = true;  // the next client knows nothing
   stats_.ended = reason;
@@ -68,6 +69,7 @@ void StreamedSession::on_pose(const transport::SequencedPose& pose) {
   if (!poses_.empty() && pose.timed.time_ns <= poses_.back().time_ns) return;
   std::erase_if(poses_, [&](const TimedPose& p) { return p.time_ns < pose.timed.time_ns - kHistoryNs; });
   poses_.push_back(pose.timed);
+  newest_pose_received_ns_ = clock_.now();
 }
 
 void StreamedSession::on_key_frame_request() {
@@ -93,17 +95,28 @@ Status StreamedSession::on_frame(FrameType type, std::span<const uint8_t> payloa
 }
 
 Status StreamedSession::on_timing(std::span<const uint8_t> payload) {
-  TESSERA_ASSIGN_OR_RETURN(const std::vector<transport::FrameTiming> timings,
-                           transport::decode_timings(payload));
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<ClientFrameTimes> timings, transport::decode_timings(payload));
   const std::lock_guard lock(mutex_);
-  for (const transport::FrameTiming& timing : timings) {
-    const auto pose = pose_of_frame_.find(timing.frame);
-    if (pose == pose_of_frame_.end() || timing.displayed <= pose->second) continue;
+  for (const ClientFrameTimes& times : timings) {
+    auto sent = under_way_.extract(times.frame);
+    if (sent.empty()) continue;
+    FrameRecord& record = sent.mapped();
+    record.client = times;
     // Both times are the client's.
-    stats_.round_trip_ns = std::min(timing.displayed - pose->second, kMaxRoundTripNs);
-    pose_of_frame_.erase(pose_of_frame_.begin(), std::next(pose));
+    if (times.displayed > record.pose_sent)
+      stats_.round_trip_ns = std::min(times.displayed - record.pose_sent, kMaxRoundTripNs);
+    if (records_.size() == kMaxRecords) records_.pop_front(), ++first_record_;
+    records_.push_back(record);
   }
   return absl::OkStatus();
+}
+
+std::vector<FrameRecord> StreamedSession::records(uint64_t first, uint64_t& next) const {
+  const std::lock_guard lock(mutex_);
+  next = first_record_ + records_.size();
+  const uint64_t skip = first > first_record_ ? first - first_record_ : 0;
+  if (skip >= records_.size()) return {};
+  return {records_.begin() + static_cast<int64_t>(skip), records_.end()};
 }
 
 Status StreamedSession::answer_ping(std::span<const uint8_t> payload) {
@@ -140,21 +153,22 @@ TimeNs StreamedSession::due_ns() const {
 
 StreamedSession::Work StreamedSession::take_work() {
   const std::lock_guard lock(mutex_);
-  if (std::exchange(restart_, false)) session_.reset();
-  return {poses_, connection_, client_view_, stats_.round_trip_ns, std::exchange(key_frame_wanted_, false),
-          rate_};
+  if (std::exchange(restart_, false)) renderer_.reset();
+  return {.poses = poses_,
+          .connection = connection_,
+          .client_view = client_view_,
+          .round_trip_ns = stats_.round_trip_ns,
+          .pose_received_ns = newest_pose_received_ns_,
+          .due_ns = due_ns_,
+          .key_frame = std::exchange(key_frame_wanted_, false),
+          .rate = rate_};
 }
 
 // Frames keep their rhythm; one that comes too late begins a new one.
-void StreamedSession::put_off(bool sent, FrameNumber number, TimeNs pose_ns) {
+void StreamedSession::put_off() {
   const TimeNs now = clock_.now();
   const std::lock_guard lock(mutex_);
-  due_ns_ += period_ns();
-  if (due_ns_ < now) due_ns_ = now;
-  ++(sent ? stats_.frames_sent : stats_.frames_skipped);
-  if (!sent) return;
-  pose_of_frame_[number] = pose_ns;
-  if (pose_of_frame_.size() > kMaxFramesInFlight) pose_of_frame_.erase(pose_of_frame_.begin());
+  due_ns_ = std::max(due_ns_ + period_ns(), now);
 }
 
 void StreamedSession::count(const Frame& frame) {
@@ -162,7 +176,7 @@ void StreamedSession::count(const Frame& frame) {
   const std::lock_guard lock(mutex_);
   stats_.key_frames += frame.atlas.key_frame ? 1 : 0;
   stats_.meta_bytes += frame.meta.size();
-  stats_.encoder = session_->encoder();
+  stats_.encoder = renderer_->encoder();
   std::erase_if(sent_, [&](const auto& s) { return s.first <= now - kRateWindowNs; });
   sent_.emplace_back(now, frame.meta.size() + frame.atlas.bytes.size());
 }
@@ -182,53 +196,78 @@ RateSplit StreamedSession::rate() const {
 }
 
 Status StreamedSession::render() {
-  Work work = take_work();
+  const Work work = take_work();
   if (!work.connection || work.poses.empty()) return absl::OkStatus();
-  if (!session_) {
+  if (!renderer_) {
     SessionSettings settings = settings_;
     settings.client_view = work.client_view;
     settings.rate = work.rate;
-    TESSERA_ASSIGN_OR_RETURN(session_, Session::create(scene_, settings));
+    TESSERA_ASSIGN_OR_RETURN(renderer_, make_renderer_(settings));
   }
-  session_->set_rate(work.rate);
+  renderer_->set_rate(work.rate);
   TESSERA_ASSIGN_OR_RETURN(
       const double budget,
       media_->frame_budget_bits(id_, from_seconds(1 / work.rate.frames_per_second), work.key_frame));
   if (budget <= 0) {  // frames are dropped before they are encoded, never after
     if (work.key_frame) on_key_frame_request();
-    put_off(false, 0, 0);
+    put_off();
+    const std::lock_guard lock(mutex_);
+    ++stats_.frames_skipped;
     return absl::OkStatus();
   }
-  const TimeNs start = clock_.now();
-  const FrameNumber number = next_frame_++;
-  TESSERA_ASSIGN_OR_RETURN(const Frame frame, session_->render({.number = number,
-                                                                .poses = work.poses,
-                                                                .round_trip_ns = work.round_trip_ns,
-                                                                .scene_time_ns = start,
-                                                                .key_frame = work.key_frame}));
-  put_off(true, number, frame.pose.time_ns);
+  FrameRecord record{.session = id_, .frame = next_frame_++};
+  record.server = {.pose_received = work.pose_received_ns, .due = work.due_ns, .render_begin = clock_.now()};
+  record.scene_time = record.server.render_begin;
+  TESSERA_ASSIGN_OR_RETURN(const Frame frame, renderer_->render({.number = record.frame,
+                                                                 .poses = work.poses,
+                                                                 .round_trip_ns = work.round_trip_ns,
+                                                                 .scene_time_ns = record.scene_time,
+                                                                 .key_frame = work.key_frame}));
+  record.server.render_end = clock_.now();
+  put_off();
   count(frame);
   log_event(spdlog::level::debug, "frame rendered",
             {{"session", id_},
-             {"frame", number},
+             {"frame", record.frame},
              {"key_frame", frame.atlas.key_frame},
              {"atlas_bytes", frame.atlas.bytes.size()},
              {"meta_bytes", frame.meta.size()},
              {"render_ms", frame.stats.times.total_ms()}});
   if (on_rendered_) on_rendered_(frame.stats);
+  return send(work, frame, record);
+}
+
+Status StreamedSession::send(const Work& work, const Frame& frame, FrameRecord record) {
+  const StageTimes& times = frame.stats.times;
+  record.pose_sent = frame.pose.time_ns;
+  record.key_frame = frame.atlas.key_frame;
+  record.atlas_bytes = frame.atlas.bytes.size();
+  record.meta_bytes = frame.meta.size();
+  record.server.visibility = from_ms(times.visibility_ms);
+  record.server.layout = from_ms(times.layout_ms);
+  record.server.shading = from_ms(times.shading_ms);
+  record.server.encode = from_ms(times.encode_ms);
   // A client that left meanwhile is no error of this frame: on_closed() tells.
   if (!work.connection->send(FrameType::meta, frame.meta).ok()) return absl::OkStatus();
-  const auto sent = media_->send_frame(id_, start, frame.atlas.bytes, frame.atlas.key_frame);
-  if (absl::IsResourceExhausted(sent.status())) {
-    on_key_frame_request();
-    return absl::OkStatus();
-  }
-  return sent.status();
+  const auto sent =
+      media_->send_frame(id_, record.server.render_begin, frame.atlas.bytes, frame.atlas.key_frame);
+  record.server.sent = clock_.now();
+  on_sent(record);
+  if (!absl::IsResourceExhausted(sent.status())) return sent.status();
+  on_key_frame_request();
+  return absl::OkStatus();
+}
+
+void StreamedSession::on_sent(const FrameRecord& record) {
+  const std::lock_guard lock(mutex_);
+  ++stats_.frames_sent;
+  under_way_[record.frame] = record;
+  if (under_way_.size() > kMaxFramesInFlight) under_way_.erase(under_way_.begin());
 }
 
 void StreamedSession::release() {
-  session_.reset();
-  scene_.reset();
+  renderer_.reset();
+  make_renderer_ = {};
 }
 
 StreamedSessionStats StreamedSession::stats() const {

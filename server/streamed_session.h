@@ -11,7 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/session.h"
+#include "base/frame_record.h"
+#include "server/frame.h"
 #include "transport/asio/media_port.h"
 #include "transport/asio/meta_connection.h"
 
@@ -35,12 +36,14 @@ struct StreamedSessionStats {
 // Thread-safe.
 class StreamedSession {
  public:
+  static constexpr size_t kMaxRecords = 1024;
+
   // `settings.client_view` is replaced by what the client's hello says.
   // `on_rendered` is called by the render thread after each frame, and must not block.
   using OnRendered = std::function<void(const FrameStats&)>;
-  StreamedSession(transport::SessionId id, std::shared_ptr<SharedScene> scene,
-                  const SessionSettings& settings, std::shared_ptr<transport::MediaPort> media,
-                  const Clock& clock, OnRendered on_rendered = {});
+  StreamedSession(transport::SessionId id, RendererFactory make_renderer, const SessionSettings& settings,
+                  std::shared_ptr<transport::MediaPort> media, const Clock& clock,
+                  OnRendered on_rendered = {});
 
   void on_connected(std::shared_ptr<transport::MetaConnection> connection);
   void on_closed(const Status& reason);
@@ -65,6 +68,9 @@ class StreamedSession {
   // Lets go of all that lies on the device; nothing is rendered afterwards.
   void release();
   StreamedSessionStats stats() const;
+  // Of the frames about which the client has reported, the last kMaxRecords; from the `first`-th on, counted
+  // from 0 over the session's life. `next` becomes the number to ask for next time.
+  std::vector<FrameRecord> records(uint64_t first, uint64_t& next) const;
   const SessionSettings& settings() const { return settings_; }  // as created; see rate()
   transport::SessionId id() const { return id_; }
 
@@ -74,14 +80,17 @@ class StreamedSession {
     std::shared_ptr<transport::MetaConnection> connection;
     View client_view;
     DurationNs round_trip_ns = 0;
+    TimeNs pose_received_ns = 0, due_ns = 0;
     bool key_frame = false;
     RateSplit rate;
   };
   Status on_timing(std::span<const uint8_t> payload);
   Status answer_ping(std::span<const uint8_t> payload);
   Work take_work();
-  void put_off(bool sent, FrameNumber number, TimeNs pose_ns);
+  Status send(const Work& work, const Frame& frame, FrameRecord record);
+  void put_off();
   void count(const Frame& frame);
+  void on_sent(const FrameRecord& record);
   DurationNs period_ns() const { return from_seconds(1.0 / rate_.frames_per_second); }  // under the lock
 
   const transport::SessionId id_;
@@ -89,15 +98,18 @@ class StreamedSession {
   const Clock& clock_;
   const SessionSettings settings_;
   const OnRendered on_rendered_;
-  std::shared_ptr<SharedScene> scene_;  // the render thread's, with all of the device
-  std::unique_ptr<Session> session_;    // likewise
-  FrameNumber next_frame_ = 1;          // likewise
+  RendererFactory make_renderer_;            // the render thread's, with all of the device
+  std::unique_ptr<FrameRenderer> renderer_;  // likewise
+  FrameNumber next_frame_ = 1;               // likewise
 
   mutable std::mutex mutex_;  // of all below
   std::shared_ptr<transport::MetaConnection> connection_;
   View client_view_;
   std::vector<TimedPose> poses_;  // on the client's clock
-  std::map<FrameNumber, TimeNs> pose_of_frame_;
+  TimeNs newest_pose_received_ns_ = 0;
+  std::map<FrameNumber, FrameRecord> under_way_;  // sent, and nothing heard of it yet
+  std::deque<FrameRecord> records_;
+  uint64_t first_record_ = 0;  // number of records_.front()
   bool admitted_ = false, bound_ = false, key_frame_wanted_ = false, restart_ = false;
   TimeNs due_ns_ = 0;
   RateSplit rate_;

@@ -14,6 +14,15 @@ constexpr uint16_t kMaxSide = 16384;
 constexpr float kMaxTangent = 60;
 constexpr uint8_t kNoSrtp = 0, kSrtpAes128Sha1 = 1;
 
+// In this order.
+constexpr TimeNs ClientFrameTimes::*kTimesOnTheWire[] = {
+    &ClientFrameTimes::atlas_first_packet, &ClientFrameTimes::atlas_complete,
+    &ClientFrameTimes::atlas_decode_begin, &ClientFrameTimes::atlas_decoded,
+    &ClientFrameTimes::meta_complete,      &ClientFrameTimes::meta_decode_begin,
+    &ClientFrameTimes::meta_decoded,       &ClientFrameTimes::draw_begin,
+    &ClientFrameTimes::displayed,          &ClientFrameTimes::clock_offset,
+    &ClientFrameTimes::clock_error};
+
 Status malformed(const char* what) {
   return absl::InvalidArgumentError(absl::StrCat(what, " message: wrong length, or a value out of range"));
 }
@@ -151,30 +160,28 @@ StatusOr<SequencedPose> decode_pose(std::span<const uint8_t> payload) {
   return finished(in, pose, "pose");
 }
 
-Bytes encode(std::span<const FrameTiming> timings) {
+Bytes encode(std::span<const ClientFrameTimes> timings) {
   timings = timings.first(std::min(timings.size(), kMaxTimings));
   Bytes out;
   ByteWriter w(out);
   w.u16(static_cast<uint16_t>(timings.size()));
-  for (const FrameTiming& t : timings) {
+  for (const ClientFrameTimes& t : timings) {
     w.u32(t.frame);
-    for (TimeNs at : {t.atlas_first_packet, t.atlas_complete, t.meta_complete, t.atlas_decoded,
-                      t.meta_decoded, t.displayed})
-      w.i64(at);
+    for (const auto time : kTimesOnTheWire) w.i64(t.*time);
   }
   return out;
 }
-
-StatusOr<std::vector<FrameTiming>> decode_timings(std::span<const uint8_t> payload) {
+StatusOr<std::vector<ClientFrameTimes>> decode_timings(std::span<const uint8_t> payload) {
   ByteReader in(payload);
   const size_t count = in.u16();
   require(in, count <= kMaxTimings);
-  std::vector<FrameTiming> timings(in.ok() ? count : 0);
-  for (FrameTiming& t : timings) {
+  std::vector<ClientFrameTimes> timings(in.ok() ? count : 0);
+  for (ClientFrameTimes& t : timings) {
     t.frame = in.u32();
-    for (TimeNs* at : {&t.atlas_first_packet, &t.atlas_complete, &t.meta_complete, &t.atlas_decoded,
-                       &t.meta_decoded, &t.displayed})
-      *at = in.i64();
+    for (const auto time : kTimesOnTheWire) {
+      t.*time = in.i64();
+      require(in, is_sane(t.*time));
+    }
   }
   return finished(in, std::move(timings), "timing");
 }
@@ -212,6 +219,7 @@ StatusOr<ClockPong> decode_pong(std::span<const uint8_t> payload) {
   m.client_sent = in.i64();
   m.server_received = in.i64();
   m.server_sent = in.i64();
+  require(in, is_sane(m.client_sent) && is_sane(m.server_received) && is_sane(m.server_sent));
   return finished(in, m, "pong");
 }
 

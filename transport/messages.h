@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/frame_number.h"
+#include "base/frame_record.h"
 #include "base/status.h"
 #include "base/view.h"
 #include "transport/rtp_sender.h"
@@ -52,14 +53,6 @@ struct Welcome {
   std::optional<SrtpKeys> srtp;                // only over TLS
 };
 
-// One frame at the client, on its clock; 0: did not happen. docs/architecture.md names the durations between
-// them.
-struct FrameTiming {
-  FrameNumber frame = 0;
-  TimeNs atlas_first_packet = 0, atlas_complete = 0, meta_complete = 0;
-  TimeNs atlas_decoded = 0, meta_decoded = 0, displayed = 0;
-  bool operator==(const FrameTiming&) const = default;
-};
 constexpr size_t kMaxTimings = 256;  // in one message
 
 struct ClockPing {
@@ -94,7 +87,7 @@ struct ByeMessage {
 std::vector<uint8_t> encode(const Hello& m);
 std::vector<uint8_t> encode(const Welcome& m);
 std::vector<uint8_t> encode(const SequencedPose& m);
-std::vector<uint8_t> encode(std::span<const FrameTiming> timings);  // the first kMaxTimings
+std::vector<uint8_t> encode(std::span<const ClientFrameTimes> timings);  // the first kMaxTimings
 std::vector<uint8_t> encode(const ClockPing& m);
 std::vector<uint8_t> encode(const ClockPong& m);
 std::vector<uint8_t> encode(const ErrorMessage& m);
@@ -105,7 +98,7 @@ std::vector<uint8_t> encode(const ByeMessage& m);
 StatusOr<Hello> decode_hello(std::span<const uint8_t> payload);
 StatusOr<Welcome> decode_welcome(std::span<const uint8_t> payload);
 StatusOr<SequencedPose> decode_pose(std::span<const uint8_t> payload);
-StatusOr<std::vector<FrameTiming>> decode_timings(std::span<const uint8_t> payload);
+StatusOr<std::vector<ClientFrameTimes>> decode_timings(std::span<const uint8_t> payload);
 StatusOr<ClockPing> decode_ping(std::span<const uint8_t> payload);
 StatusOr<ClockPong> decode_pong(std::span<const uint8_t> payload);
 StatusOr<ErrorMessage> decode_error(std::span<const uint8_t> payload);

@@ -18,7 +18,7 @@ SequencedPose read_pose(ByteReader& in) {
   Pose& p = pose.timed.pose;
   pose.sequence = in.u32();
   pose.timed.time_ns = in.i64();
-  bool good = true;
+  bool good = is_sane(pose.timed.time_ns);
   for (int axis = 0; axis < 3; ++axis) {
     p.position[axis] = in.f64();
     good = good && std::abs(p.position[axis]) <= kMaxPositionM;  // false for NaN

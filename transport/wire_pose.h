@@ -15,10 +15,15 @@ struct SequencedPose {
 };
 
 constexpr double kMaxPositionM = 1e9;
+// Of every time that comes from outside, of either sign: sums of a few never overflow.
+constexpr TimeNs kMaxTimeNs = TimeNs{1} << 60;
+constexpr bool is_sane(TimeNs t) {
+  return t >= -kMaxTimeNs && t <= kMaxTimeNs;
+}
 
 void write_pose(const SequencedPose& pose, ByteWriter& out);
-// Latches the reader's error for a value that is not finite, a position beyond ±kMaxPositionM, or a
-// quaternion whose length is not within 0.5..2. The result has unit length.
+// Latches the reader's error for a time beyond kMaxTimeNs, a value that is not finite, a position beyond
+// ±kMaxPositionM, or a quaternion whose length is not within 0.5..2. The result has unit length.
 SequencedPose read_pose(ByteReader& in);
 
 // Newest wins: whether a pose is newer than all before it (serial numbers, RFC 1982).

@@ -93,7 +93,7 @@ TEST(ClientCore, PairsEveryFrameOfAnUndisturbedStream) {
     if (i % 2 == 0) {
       ASSERT_TRUE(core->on_meta(stream[i].meta).ok());
     }
-    const Status status = core->on_atlas(stream[i].atlas);
+    const Status status = core->on_atlas(stream[i].atlas).status();
     ASSERT_TRUE(status.ok()) << status;
     if (i % 2 == 1) {
       ASSERT_TRUE(core->on_meta(stream[i].meta).ok());
@@ -123,7 +123,7 @@ TEST(ClientCore, ABrokenVideoChainIsNotShownUntilTheNextKeyFrame) {
         }
         continue;
       }
-      const Status status = core->on_atlas(stream[i].atlas);
+      const Status status = core->on_atlas(stream[i].atlas).status();
       const bool broken = i > 2 && i < 6;
       EXPECT_EQ(status.ok(), !broken) << i;
       EXPECT_EQ(core->wants_key_frame(), broken);
@@ -151,10 +151,10 @@ TEST(ClientCore, ADamagedMetaPacketIsAnErrorThatLastsUntilFullState) {
   const auto stream = make_stream(4, {0});
   auto core = make_core();
   ASSERT_TRUE(core->on_meta(stream[0].meta).ok());
-  const Status status = core->on_meta(std::span(stream[1].meta).first(stream[1].meta.size() / 2));
+  const Status status = core->on_meta(std::span(stream[1].meta).first(stream[1].meta.size() / 2)).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(status.message()), HasSubstr("meta packet of"));
-  EXPECT_EQ(core->on_meta(stream[2].meta).code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(core->on_meta(stream[2].meta).status().code(), absl::StatusCode::kFailedPrecondition);
   for (uint32_t i = 0; i < 4; ++i) ASSERT_TRUE(core->on_atlas(stream[i].atlas).ok());
   EXPECT_EQ(take(*core), 0u);
 

@@ -43,6 +43,51 @@ TEST_F(DaemonTest, FromLoadToPictureToUnload) {
   EXPECT_EQ(unload("hall").error_code(), grpc::StatusCode::NOT_FOUND);
 }
 
+TEST_F(DaemonTest, WatchersOfFramesGetEachRecordOnce) {
+  start({.scenes = {"hall=gallery:0"}});
+  v1::Ticket ticket;
+  ASSERT_TRUE(create("hall", &ticket).ok());
+  auto client = connect(ticket);
+  ASSERT_TRUE(client.ok()) << client.status();
+  std::atomic<bool> enough = false;
+  std::thread viewer([&] {
+    while (!enough && (*client)->status().ok()) {
+      const client::Pair* pair = first_pair(**client);
+      if (pair) (*client)->report_displayed(pair->frame, clock_.now());
+    }
+  });
+  const auto watch = [&](uint64_t first, bool once, size_t at_most) {
+    grpc::ClientContext context;
+    v1::WatchFramesRequest request;
+    request.set_session(ticket.session());
+    request.set_first(first);
+    request.set_once(once);
+    const auto reader = control_->WatchFrames(&context, request);
+    std::vector<v1::FrameRecord> records;
+    for (v1::FrameRecord record; records.size() < at_most && reader->Read(&record);)
+      records.push_back(record);
+    context.TryCancel();
+    (void)reader->Finish();
+    return records;
+  };
+  const auto records = watch(0, false, 6);
+  enough = true;
+  viewer.join();
+  ASSERT_EQ(records.size(), 6u);
+  for (size_t i = 0; i < records.size(); ++i) {
+    EXPECT_EQ(records[i].index(), i);
+    EXPECT_EQ(records[i].session(), ticket.session());
+    if (i > 0) {
+      EXPECT_GT(records[i].frame(), records[i - 1].frame());
+    }
+  }
+  const auto rest = watch(4, true, 1000);  // ends by itself
+  ASSERT_GE(rest.size(), 2u);
+  EXPECT_EQ(rest[0].index(), 4u);
+  EXPECT_EQ(rest[0].frame(), records[4].frame());
+  EXPECT_TRUE(watch(1u << 30, true, 1000).empty());
+}
+
 TEST_F(DaemonTest, WatchersSeeTheSessionUntilItEnds) {
   start({.scenes = {"hall=gallery:0"}});
   v1::Ticket ticket;

@@ -6,8 +6,12 @@
 #include <functional>
 #include <thread>
 
+#include "client-sdk/client_core.h"
 #include "client-sdk/connection.h"
+#include "client-sdk/display.h"
+#include "codec/yuv.h"
 #include "scene/procedural.h"
+#include "server/session.h"
 
 namespace tessera::server {
 namespace {
@@ -16,6 +20,39 @@ using testing::Test;
 
 constexpr DurationNs kDisplayNs = 5 * kNsPerMs;
 constexpr DurationNs kPatienceNs = 60 * kNsPerSecond;  // only a hang takes so long
+
+// A clock far from the server's.
+class OtherClock final : public Clock {
+ public:
+  TimeNs now() const override { return steady_.now() - kBehindNs; }
+  static constexpr DurationNs kBehindNs = 1'234'567'890'123;
+
+ private:
+  SteadyClock steady_;
+};
+
+// What a frame was made of and what came out, with a session of its own behind.
+struct Recorded {
+  std::vector<TimedPose> poses;
+  FrameInput input;
+  Frame frame;
+};
+class RecordingRenderer final : public FrameRenderer {
+ public:
+  RecordingRenderer(std::unique_ptr<FrameRenderer> renderer, std::vector<Recorded>& log)
+      : renderer_(std::move(renderer)), log_(log) {}
+  StatusOr<Frame> render(const FrameInput& input) override {
+    TESSERA_ASSIGN_OR_RETURN(Frame frame, renderer_->render(input));
+    log_.push_back({{input.poses.begin(), input.poses.end()}, input, frame});
+    return frame;
+  }
+  void set_rate(const RateSplit& rate) override { renderer_->set_rate(rate); }
+  const std::string& encoder() const override { return renderer_->encoder(); }
+
+ private:
+  std::unique_ptr<FrameRenderer> renderer_;
+  std::vector<Recorded>& log_;
+};
 
 class StreamServerTest : public Test {
  protected:
@@ -48,12 +85,15 @@ class StreamServerTest : public Test {
   }
 
   SessionTicket ticket() {
-    auto ticket = server_->create_session(scene_, small());
+    auto ticket = server_->create_session(renders(scene_), small());
     EXPECT_TRUE(ticket.ok()) << ticket.status();
     return ticket.ok() ? *ticket : SessionTicket{};
   }
 
   StatusOr<std::unique_ptr<client::Connection>> connect(const SessionTicket& ticket) {
+    return connect(ticket, clock_);
+  }
+  StatusOr<std::unique_ptr<client::Connection>> connect(const SessionTicket& ticket, const Clock& clock) {
     return client::Connection::connect({.meta_port = ticket.meta_port,
                                         .token = ticket.token,
                                         .client = {.width = 160,
@@ -61,7 +101,7 @@ class StreamServerTest : public Test {
                                                    .fov = Fov::symmetric(1.0f, 16.0f / 9.0f),
                                                    .display_hz = 60,
                                                    .name = "test"}},
-                                       clock_);
+                                       clock);
   }
 
   // A client's display loop until `done`: a pose each time, and what is newest is reported as shown.
@@ -124,6 +164,121 @@ TEST_F(StreamServerTest, TheServerLearnsTheRoundTripFromTheClient) {
   EXPECT_TRUE(display_until(
       **client, [&](const client::Pair*) { return server_->stats(a.session)->round_trip_ns != assumed; }));
   EXPECT_GT(server_->stats(a.session)->round_trip_ns, 0);
+}
+
+// R6: the stages tile the total, although the two clocks have nothing in common.
+TEST_F(StreamServerTest, EveryFramesRecordTilesItsTimeFromPoseToPicture) {
+  start();
+  const SessionTicket a = ticket();
+  const OtherClock clock;
+  auto client = connect(a, clock);
+  ASSERT_TRUE(client.ok()) << client.status();
+  std::vector<FrameRecord> records;
+  uint64_t next = 0;
+  const TimeNs give_up = clock.now() + kPatienceNs;
+  size_t whole = 0;
+  while (whole < 10 && clock.now() < give_up) {
+    (*client)->send_pose({clock.now(), {.position = dvec3(0, 1.6, 0)}});
+    if (const client::Pair* pair = (*client)->take_newest())
+      (*client)->report_displayed(pair->frame, clock.now());
+    const auto more = server_->records(a.session, next, next);
+    ASSERT_TRUE(more.ok()) << more.status();
+    records.insert(records.end(), more->begin(), more->end());
+    whole = static_cast<size_t>(
+        std::ranges::count_if(records, [](const auto& r) { return durations(r).has_value(); }));
+    std::this_thread::sleep_for(std::chrono::nanoseconds(kDisplayNs));
+  }
+  ASSERT_GE(whole, 10u);
+  EXPECT_EQ(next, records.size());
+  for (const FrameRecord& r : records) {
+    const auto d = durations(r);
+    if (!d) continue;
+    EXPECT_EQ(r.session, a.session);
+    EXPECT_EQ(r.frame, r.client.frame);
+    EXPECT_GT(r.atlas_bytes, 0u);
+    EXPECT_LE(std::abs(r.client.clock_offset - OtherClock::kBehindNs), r.client.clock_error);
+    EXPECT_LE(std::abs(d->end_to_end - d->sum()), kNsPerMs) << "frame " << r.frame;
+    // The offset may be wrong by its error; all else is exact.
+    for (const auto& [name, duration] : d->named()) {
+      const bool crosses = name == "pose_uplink" || name == "downlink";
+      EXPECT_GE(duration, crosses ? -r.client.clock_error : 0) << name << " of frame " << r.frame;
+    }
+    EXPECT_GE(d->overhead, 0);
+    EXPECT_LE(r.client.atlas_first_packet, r.client.atlas_complete);
+  }
+}
+
+// The same inputs give the same pictures, whether real sockets and clocks lie between the two ends or
+// nothing.
+TEST_F(StreamServerTest, PicturesOverSocketsAreThoseOfVirtualTime) {
+  start();
+  std::vector<Recorded> log;  // the render thread's, until the server is gone
+  const auto recording =
+      [&, make = renders(scene_)](const SessionSettings& s) -> StatusOr<std::unique_ptr<FrameRenderer>> {
+    TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<FrameRenderer> session, make(s));
+    return std::make_unique<RecordingRenderer>(std::move(session), log);
+  };
+  const auto a = server_->create_session(recording, small());
+  ASSERT_TRUE(a.ok()) << a.status();
+  auto connected = connect(*a);
+  ASSERT_TRUE(connected.ok()) << connected.status();
+  auto display = client::Display::create({.width = 160, .height = 90});
+  ASSERT_TRUE(display.ok()) << display.status();
+  View view;
+  view.width = 160, view.height = 90;
+  view.fov = Fov::symmetric(1.0f, 16.0f / 9.0f);
+  const auto draw = [&](const client::Pair& pair, const Pose& pose) {
+    view.pose = pose;
+    EXPECT_TRUE((*display)->set_state(pair.state).ok());
+    EXPECT_TRUE((*display)->set_atlas(codec::view_of(pair.atlas)).ok());
+    auto image = (*display)->draw(view);
+    EXPECT_TRUE(image.ok()) << image.status();
+    return image.ok() ? image->rgba : std::vector<uint8_t>{};
+  };
+
+  struct Shown {
+    Pose pose;
+    std::vector<uint8_t> picture;
+  };
+  std::map<FrameNumber, Shown> shown;
+  for (const TimeNs give_up = clock_.now() + kPatienceNs; shown.size() < 8 && clock_.now() < give_up;) {
+    Pose pose{.position = dvec3(0.05 * static_cast<double>(shown.size()), 1.6, 0)};
+    pose.orientation = glm::angleAxis(0.1 * static_cast<double>(shown.size()), dvec3(0, 1, 0));
+    (*connected)->send_pose({clock_.now(), pose});
+    if (const client::Pair* pair = (*connected)->take_newest()) {
+      shown[pair->frame] = {pose, draw(*pair, pose)};
+      (*connected)->report_displayed(pair->frame, clock_.now());
+    }
+    std::this_thread::sleep_for(std::chrono::nanoseconds(kDisplayNs));
+  }
+  ASSERT_EQ(shown.size(), 8u) << (*connected)->status();
+  connected->reset();
+  server_.reset();  // the device is this thread's now
+
+  SessionSettings settings = small();
+  settings.client_view = view;
+  auto session = renders(scene_)(settings);
+  ASSERT_TRUE(session.ok()) << session.status();
+  auto core = client::ClientCore::create();
+  ASSERT_TRUE(core.ok()) << core.status();
+  size_t compared = 0;
+  for (const Recorded& r : log) {
+    FrameInput input = r.input;
+    input.poses = r.poses;
+    const auto frame = (*session)->render(input);
+    ASSERT_TRUE(frame.ok()) << frame.status();
+    ASSERT_EQ(frame->meta, r.frame.meta) << "frame " << input.number;
+    ASSERT_EQ(frame->atlas.bytes, r.frame.atlas.bytes) << "frame " << input.number;
+    ASSERT_TRUE((*core)->on_meta(frame->meta).ok());
+    ASSERT_TRUE((*core)->on_atlas(frame->atlas.bytes).ok());
+    const client::Pair* pair = (*core)->take_newest();
+    ASSERT_TRUE(pair && pair->frame == input.number);
+    const auto was = shown.find(input.number);
+    if (was == shown.end()) continue;
+    EXPECT_EQ(draw(*pair, was->second.pose), was->second.picture) << "frame " << input.number;
+    ++compared;
+  }
+  EXPECT_EQ(compared, shown.size());
 }
 
 TEST_F(StreamServerTest, AWrongTokenIsRefusedAndDisturbsNobody) {
@@ -196,7 +351,7 @@ TEST_F(StreamServerTest, ScenesComeAndGoWhileSessionsRun) {
     });
     ASSERT_TRUE(loaded.ok()) << loaded;
     const std::weak_ptr<SharedScene> watched = other;
-    const auto session = server_->create_session(std::exchange(other, nullptr), small());
+    const auto session = server_->create_session(renders(std::exchange(other, nullptr)), small());
     ASSERT_TRUE(session.ok()) << session.status();
     auto visitor = connect(*session);
     ASSERT_TRUE(visitor.ok()) << visitor.status();
@@ -214,10 +369,10 @@ TEST_F(StreamServerTest, SessionsAreLimited) {
   start({.max_sessions = 2});
   ticket();
   const SessionTicket second = ticket();
-  const auto third = server_->create_session(scene_, small());
+  const auto third = server_->create_session(renders(scene_), small());
   EXPECT_TRUE(absl::IsResourceExhausted(third.status())) << third.status();
   EXPECT_TRUE(server_->end_session(second.session, "").ok());
-  EXPECT_TRUE(server_->create_session(scene_, small()).ok());
+  EXPECT_TRUE(server_->create_session(renders(scene_), small()).ok());
 }
 
 TEST_F(StreamServerTest, ABusyPortIsNamed) {

@@ -46,10 +46,11 @@ TEST(Messages, KnownBytes) {
             from_hex("00000001 0000000000000002 0000000000000003 0000000000000004"));
   EXPECT_EQ(encode(ErrorMessage{ErrorCode::bad_token, "abc"}), from_hex("0001 0003 616263"));
   EXPECT_EQ(encode(ByeMessage{"abc"}), from_hex("0003 616263"));
-  const FrameTiming timing{7, 1, 2, 3, 4, 5, -6};
+  const ClientFrameTimes timing{7, 1, 2, 3, 4, 5, 6, 7, 8, 9, -10, 11};
   EXPECT_EQ(encode(std::span(&timing, 1)),
             from_hex("0001 00000007 0000000000000001 0000000000000002 0000000000000003 0000000000000004"
-                     "0000000000000005 fffffffffffffffa"));
+                     "0000000000000005 0000000000000006 0000000000000007 0000000000000008 0000000000000009"
+                     "fffffffffffffff6 000000000000000b"));
 }
 
 TEST(Messages, ComeBackAsTheyWere) {
@@ -70,7 +71,8 @@ TEST(Messages, ComeBackAsTheyWere) {
     EXPECT_EQ(welcome->srtp, m.srtp);
     EXPECT_EQ(welcome->media_port, 5004);
   }
-  const std::vector<FrameTiming> timings = {{1, 2, 3, 4, 5, 6, 7}, {8, 9, 10, 11, 12, 13, 14}};
+  const std::vector<ClientFrameTimes> timings = {{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12},
+                                                 {13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24}};
   EXPECT_EQ(*decode_timings(encode(timings)), timings);
   EXPECT_EQ(*decode_ping(encode(ClockPing{9, -5})), (ClockPing{9, -5}));
   EXPECT_EQ(*decode_pong(encode(ClockPong{9, 1, 2, 3})), (ClockPong{9, 1, 2, 3}));
@@ -81,7 +83,7 @@ TEST(Messages, ComeBackAsTheyWere) {
 TEST(Messages, EveryTruncationAndEveryExtraByteIsAnError) {
   Welcome with_keys = some_welcome();
   with_keys.srtp.emplace();
-  const std::vector<FrameTiming> timings(3);
+  const std::vector<ClientFrameTimes> timings(3);
   const SequencedPose pose{1, {2, {}}};
   const std::pair<Bytes, std::function<Status(const Bytes&)>> cases[] = {
       {encode(some_hello()), [](const Bytes& b) { return decode_hello(b).status(); }},
@@ -124,6 +126,12 @@ TEST(Messages, ValuesOutsideTheirRangeAreRefused) {
   welcome.frames_per_second = nan;
   EXPECT_FALSE(decode_welcome(encode(welcome)).ok());
   EXPECT_FALSE(decode_timings(from_hex("0101")).ok());
+  for (const TimeNs far : {kMaxTimeNs + 1, -kMaxTimeNs - 1, std::numeric_limits<TimeNs>::min()}) {
+    const ClientFrameTimes timing{.displayed = far};
+    EXPECT_FALSE(decode_timings(encode(std::span(&timing, 1))).ok()) << far;
+    EXPECT_FALSE(decode_pose(encode(SequencedPose{1, {far, {}}})).ok()) << far;
+    EXPECT_FALSE(decode_pong(encode(ClockPong{1, 0, far, 0})).ok()) << far;
+  }
   Bytes long_name = encode(some_hello());
   long_name.resize(long_name.size() - 8);
   long_name.insert(long_name.end(), {0, 65});

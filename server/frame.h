@@ -1,0 +1,81 @@
+// What goes into a session's frame and what comes out, and who makes it.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "atlas/blocks/layout.h"
+#include "base/frame_number.h"
+#include "base/status.h"
+#include "base/view.h"
+#include "codec/video_encoder.h"
+#include "geometry-compression/meta_codec.h"
+#include "pvs/prediction.h"
+#include "pvs/visibility.h"
+#include "server/rate_split.h"
+#include "shading/gather.h"
+
+namespace tessera::server {
+
+struct SessionSettings {
+  View client_view;  // the client's resolution and field of view; its pose is ignored
+  atlas::blocks::LayoutSettings layout;
+  pvs::PredictionSettings prediction;  // horizon_ns is set for every frame
+  pvs::VisibilitySettings visibility;
+  shading::GatherPath gather_path = shading::GatherPath::automatic;
+  RateSplit rate;
+  std::string encoder = "auto";
+};
+
+struct FrameInput {
+  FrameNumber number = 0;
+  std::span<const TimedPose> poses;  // received so far, by time, newest last; at least one
+  DurationNs round_trip_ns = 0;      // from a pose to the picture that shows its frame
+  TimeNs scene_time_ns = 0;          // animation
+  bool key_frame = false;
+};
+
+// Wall time of each stage.
+struct StageTimes {
+  double visibility_ms = 0, layout_ms = 0, shading_ms = 0, encode_ms = 0;
+  double total_ms() const { return visibility_ms + layout_ms + shading_ms + encode_ms; }
+};
+
+struct FrameStats {
+  StageTimes times;
+  uint32_t predicted_views = 0;
+  size_t visible_patches = 0;  // seen in this frame's views
+  size_t placed_patches = 0;   // with those that stay for one round trip
+  pvs::VisibilityStats visibility;
+  atlas::blocks::LayoutStats layout;
+  shading::GatherStats gather;
+  geometry_compression::MetaBits meta_bits;
+};
+
+struct Frame {
+  FrameNumber number = 0;
+  TimedPose pose;  // the newest pose that it was made for
+  codec::AccessUnit atlas;
+  std::vector<uint8_t> meta;
+  FrameStats stats;
+};
+
+class FrameRenderer {
+ public:
+  virtual ~FrameRenderer() = default;
+  // Blocks until the frame is encoded. The first frame is a key frame.
+  virtual StatusOr<Frame> render(const FrameInput& input) = 0;
+  // For the frames from now on.
+  virtual void set_rate(const RateSplit& rate) = 0;
+  virtual const std::string& encoder() const = 0;  // which one runs, and why
+};
+
+// Called on the render thread, once the client's view is known. It holds what the renderer is made of; where
+// that lies on a device, the factory is destroyed on the render thread, too.
+using RendererFactory =
+    std::function<StatusOr<std::unique_ptr<FrameRenderer>>(const SessionSettings& settings)>;
+
+}  // namespace tessera::server
