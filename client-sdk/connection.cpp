@@ -47,6 +47,7 @@ struct Connection::Impl {
   void request_key_frame();
   void ping();
   void end(const Status& reason);
+  void opened(const Status& status);
 
   const ConnectionSettings settings;
   const Clock& clock;
@@ -56,6 +57,8 @@ struct Connection::Impl {
   asio::steady_timer ping_timer;
   std::shared_ptr<transport::MetaConnection> meta;  // set once, before the media client opens
   std::shared_ptr<transport::MediaClient> media;
+  std::promise<Status> media_opened;  // or the session has ended before
+  std::atomic<bool> media_told = false;
   transport::Welcome welcome;
   std::atomic<uint32_t> pose_sequence = 0;
   uint32_t ping_id = 0;  // the receiving thread's, as is
@@ -72,8 +75,16 @@ struct Connection::Impl {
 };
 
 void Connection::Impl::end(const Status& reason) {
-  const std::lock_guard lock(mutex);
-  if (ended.ok()) ended = reason.ok() ? absl::CancelledError("the server ended the session") : reason;
+  const Status why = reason.ok() ? absl::CancelledError("the server ended the session") : reason;
+  {
+    const std::lock_guard lock(mutex);
+    if (ended.ok()) ended = why;
+  }
+  opened(why);
+}
+
+void Connection::Impl::opened(const Status& status) {
+  if (!media_told.exchange(true)) media_opened.set_value(status);
 }
 
 Status Connection::Impl::open() {
@@ -108,11 +119,6 @@ Status Connection::Impl::open_meta() {
 }
 
 Status Connection::Impl::open_media() {
-  const auto done = std::make_shared<std::promise<Status>>();
-  const auto told = std::make_shared<std::atomic<bool>>(false);
-  const auto tell = [done, told](const Status& status) {
-    if (!told->exchange(true)) done->set_value(status);
-  };
   transport::MediaClientSettings media_settings{.server_address = settings.server_address,
                                                 .server_port = welcome.media_port,
                                                 .token = settings.token,
@@ -122,21 +128,18 @@ Status Connection::Impl::open_media() {
   media_settings.receiver.rtx_payload_type = welcome.stream.rtx_payload_type;
   media_settings.receiver.ssrc = welcome.stream.ssrc;
   media_settings.receiver.rtx_ssrc = welcome.stream.rtx_ssrc;
-  auto opened = transport::MediaClient::open(
+  media_settings.receiver.first_sequence = welcome.stream.first_sequence;
+  auto client = transport::MediaClient::open(
       asio::make_strand(io), media_settings, clock,
-      {.on_bound = [tell](DurationNs) { tell(absl::OkStatus()); },
+      {.on_bound = [this](DurationNs) { opened(absl::OkStatus()); },
        .on_frame = [this](transport::ReceivedFrame frame) { on_access_unit(std::move(frame)); },
-       .on_failed =
-           [this, tell](const Status& status) {
-             tell(status);
-             end(status);
-           }});
-  if (!opened.ok()) return opened.status();
+       .on_failed = [this](const Status& status) { end(status); }});
+  if (!client.ok()) return client.status();
   {
     const std::lock_guard lock(mutex);
-    media = *opened;
+    media = *client;
   }
-  return done->get_future().get();
+  return media_opened.get_future().get();
 }
 
 Status Connection::Impl::on_frame(FrameType type, std::span<const uint8_t> payload) {

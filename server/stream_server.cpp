@@ -38,13 +38,7 @@ void add_counters(StreamedSessionStats& sum, const StreamedSessionStats& s) {
   sum.frames_skipped += s.frames_skipped;
   sum.key_frames += s.key_frames;
   sum.meta_bytes += s.meta_bytes;
-  sum.media.packets += s.media.packets;
-  sum.media.bytes += s.media.bytes;
-  sum.media.retransmitted += s.media.retransmitted;
-  sum.media.retransmitted_bytes += s.media.retransmitted_bytes;
-  sum.media.nacked += s.media.nacked;
-  sum.media.key_frame_requests += s.media.key_frame_requests;
-  sum.media.malformed_rtcp += s.media.malformed_rtcp;
+  sum.media += s.media;
 }
 
 uint64_t texels(const SessionSettings& settings) {
@@ -53,10 +47,30 @@ uint64_t texels(const SessionSettings& settings) {
 
 struct Entry {
   SessionToken token;
-  transport::StreamIds ids;
-  std::optional<transport::SrtpKeys> srtp;
   std::shared_ptr<StreamedSession> session;
 };
+
+// What one client receives by UDP. Each has its own: nothing of the client before is left in queues and
+// counters, and no key protects two streams.
+struct MediaStream {
+  std::unique_ptr<transport::RtpSender> sender;
+  std::optional<transport::SrtpKeys> srtp;
+};
+
+StatusOr<MediaStream> make_stream(const RateSplit& rate, bool encrypted) {
+  MediaStream stream;
+  std::array<uint8_t, 8> seed{};
+  TESSERA_RETURN_IF_ERROR(fill_random(seed));
+  transport::RtpSenderSettings rtp{.pacer = {.rate_bps = rate.bitrate_bps}};
+  std::copy(seed.begin(), seed.end(), reinterpret_cast<uint8_t*>(&rtp.seed));
+  TESSERA_ASSIGN_OR_RETURN(stream.sender, transport::RtpSender::create(rtp));
+  if (encrypted) {
+    stream.srtp.emplace();
+    TESSERA_RETURN_IF_ERROR(fill_random(stream.srtp->server));
+    TESSERA_RETURN_IF_ERROR(fill_random(stream.srtp->client));
+  }
+  return stream;
+}
 
 }  // namespace
 
@@ -79,6 +93,9 @@ struct StreamServer::Impl {
   void do_device_work(std::unique_lock<std::mutex>& lock);
   void wake();
   StatusOr<transport::Admission> admit(const transport::Hello& hello, const std::string& peer);
+  StatusOr<Entry> find_token(const SessionToken& token) const;
+  StatusOr<transport::Welcome> open_media(const Entry& entry);
+  void on_left(StreamedSession& session, const Status& reason);
   transport::MediaSessionEvents media_events(const std::shared_ptr<StreamedSession>& session);
   Status check_room(const SessionSettings& wanted) const;
   void refuse(const Status& reason, const std::string& peer);
@@ -184,29 +201,51 @@ transport::MediaSessionEvents StreamServer::Impl::media_events(
           .on_left = {}};
 }
 
-StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello& hello,
-                                                         const std::string& peer) {
-  std::unique_lock lock(mutex);
+StatusOr<Entry> StreamServer::Impl::find_token(const SessionToken& token) const {
+  const std::lock_guard lock(mutex);
   const Entry* found = nullptr;
   for (const auto& [id, entry] : sessions)
-    if (transport::equal_in_constant_time(entry.token, hello.token)) found = &entry;
+    if (transport::equal_in_constant_time(entry.token, token)) found = &entry;
   if (!found) return absl::UnauthenticatedError("no session has this token; create one and use its token");
-  const Entry entry = *found;
-  lock.unlock();
+  return *found;
+}
 
+StatusOr<transport::Welcome> StreamServer::Impl::open_media(const Entry& entry) {
+  const SessionSettings& s = entry.session->settings();
+  const RateSplit rate = entry.session->rate();
+  TESSERA_ASSIGN_OR_RETURN(MediaStream stream, make_stream(rate, settings.meta.tls != nullptr));
+  const transport::StreamIds ids = stream.sender->ids();
+  TESSERA_RETURN_IF_ERROR(media->add_session(entry.session->id(), entry.token, std::move(stream.sender),
+                                             media_events(entry.session), stream.srtp));
+  return transport::Welcome{.session = entry.session->id(),
+                            .media_port = media->port(),
+                            .stream = ids,
+                            .atlas_width = static_cast<uint16_t>(s.layout.width),
+                            .atlas_height = static_cast<uint16_t>(s.layout.height),
+                            .frames_per_second = static_cast<float>(rate.frames_per_second),
+                            .srtp = stream.srtp};
+}
+
+void StreamServer::Impl::on_left(StreamedSession& session, const Status& reason) {
+  session.count_media();
+  media->remove_session(session.id(), std::string(reason.message()));
+  session.on_closed(reason);
+}
+
+StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello& hello,
+                                                         const std::string& peer) {
+  TESSERA_ASSIGN_OR_RETURN(const Entry entry, find_token(hello.token));
   const std::shared_ptr<StreamedSession> session = entry.session;
   TESSERA_RETURN_IF_ERROR(session->admit(hello.client));
+  StatusOr<transport::Welcome> welcome = open_media(entry);
+  if (!welcome.ok()) {
+    on_left(*session, welcome.status());
+    return welcome.status();
+  }
   log_event(spdlog::level::info, "client connected",
             {{"session", session->id()}, {"name", hello.client.name}, {"peer", peer}});
-  const SessionSettings& s = session->settings();
   return transport::Admission{
-      .welcome = {.session = session->id(),
-                  .media_port = media->port(),
-                  .stream = entry.ids,
-                  .atlas_width = static_cast<uint16_t>(s.layout.width),
-                  .atlas_height = static_cast<uint16_t>(s.layout.height),
-                  .frames_per_second = static_cast<float>(session->rate().frames_per_second),
-                  .srtp = entry.srtp},
+      .welcome = *std::move(welcome),
       .events = {.on_frame =
                      [this, session](transport::FrameType type, std::span<const uint8_t> payload) {
                        const Status status = session->on_frame(type, payload);
@@ -214,10 +253,10 @@ StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello&
                        return status;
                      },
                  .on_closed =
-                     [session](const Status& reason) {
+                     [this, session](const Status& reason) {
                        log_event(spdlog::level::info, "client left",
                                  {{"session", session->id()}, {"reason", reason.ToString()}});
-                       session->on_closed(reason);
+                       on_left(*session, reason);
                      }},
       .on_connected = [this, session](std::shared_ptr<transport::MetaConnection> connection) {
         session->on_connected(std::move(connection));
@@ -308,39 +347,26 @@ StatusOr<SessionTicket> StreamServer::create_session(RendererFactory renderer,
                                                      const SessionSettings& settings) {
   Impl& s = *impl_;
   SessionTicket ticket{.media_port = media_port(), .meta_port = meta_port()};
-  std::array<uint8_t, 8> seed{};
   TESSERA_RETURN_IF_ERROR(fill_random(ticket.token));
-  TESSERA_RETURN_IF_ERROR(fill_random(seed));
-  transport::RtpSenderSettings rtp{.pacer = {.rate_bps = settings.rate.bitrate_bps}};
-  std::copy(seed.begin(), seed.end(), reinterpret_cast<uint8_t*>(&rtp.seed));
-  TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<transport::RtpSender> sender, transport::RtpSender::create(rtp));
-  Entry entry{.token = ticket.token, .ids = sender->ids()};
-  if (s.settings.meta.tls) {
-    entry.srtp.emplace();
-    TESSERA_RETURN_IF_ERROR(fill_random(entry.srtp->server));
-    TESSERA_RETURN_IF_ERROR(fill_random(entry.srtp->client));
-  }
-
   const std::lock_guard lock(s.mutex);
   TESSERA_RETURN_IF_ERROR(s.check_room(settings));
   ticket.session = s.next_id++;
-  entry.session = std::make_shared<StreamedSession>(ticket.session, std::move(renderer), settings, s.media,
-                                                    s.clock, s.settings.on_rendered);
-  TESSERA_RETURN_IF_ERROR(s.media->add_session(ticket.session, ticket.token, std::move(sender),
-                                               s.media_events(entry.session), entry.srtp));
-  s.sessions.emplace(ticket.session, std::move(entry));
+  s.sessions[ticket.session] = {
+      ticket.token, std::make_shared<StreamedSession>(ticket.session, std::move(renderer), settings, s.media,
+                                                      s.clock, s.settings.on_rendered)};
   return ticket;
 }
 
 StatusOr<Forwarding> StreamServer::forward(SessionId session, const transport::PeerAddress& to) {
   Impl& s = *impl_;
   transport::SdpSettings sdp{.address = transport::to_string(to), .port = to.port, .retransmission = false};
-  {
-    const std::lock_guard lock(s.mutex);
-    const auto found = s.sessions.find(session);
-    if (found == s.sessions.end()) return absl::NotFoundError(absl::StrCat("there is no session ", session));
-    sdp.stream = found->second.ids;
+  TESSERA_RETURN_IF_ERROR(s.find(session).status());
+  const std::optional<transport::StreamIds> ids = s.media->stream_ids(session);
+  if (!ids) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("session ", session, " has no client, so there is no stream: connect its client first"));
   }
+  sdp.stream = *ids;
   if (s.settings.meta.tls) {
     sdp.srtp.emplace();
     TESSERA_RETURN_IF_ERROR(fill_random(*sdp.srtp));

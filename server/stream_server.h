@@ -70,7 +70,7 @@ class StreamServer {
   // FailedPrecondition: no frame was sent yet; ResourceExhausted: MediaPort::kMaxTaps.
   StatusOr<Forwarding> forward(transport::SessionId session, const transport::PeerAddress& to);
   void end_forward(const Forwarding& forwarding);
-  // Sent so far. NotFound: the session has ended.
+  // Sent so far. NotFound: the session has ended, or its client has left.
   StatusOr<uint64_t> forwarded_packets(const Forwarding& forwarding) const;
   // NotFound.
   Status end_session(transport::SessionId session, const std::string& reason);

@@ -16,6 +16,12 @@ constexpr DurationNs kMaxRoundTripNs = kNsPerSecond;
 constexpr size_t kMaxFramesInFlight = 256;
 constexpr DurationNs kRateWindowNs = kNsPerSecond;
 
+// The media port says so when the client has just left, or its address went to another session: no error of
+// the frame.
+bool left(const Status& status) {
+  return absl::IsNotFound(status) || absl::IsFailedPrecondition(status);
+}
+
 }  // namespace
 
 StreamedSession::StreamedSession(transport::SessionId id, RendererFactory make_renderer,
@@ -33,6 +39,7 @@ StreamedSession::StreamedSession(transport::SessionId id, RendererFactory make_r
 
 Status StreamedSession::admit(const transport::ClientSettings& client) {
   const std::lock_guard lock(mutex_);
+  if (closed_) return absl::NotFoundError(absl::StrCat("session ", id_, " has ended"));
   if (admitted_) {
     return absl::FailedPreconditionError(
         absl::StrCat("session ", id_, " has a client already; create a session for each client"));
@@ -45,8 +52,16 @@ Status StreamedSession::admit(const transport::ClientSettings& client) {
 }
 
 void StreamedSession::on_connected(std::shared_ptr<transport::MetaConnection> connection) {
-  const std::lock_guard lock(mutex_);
-  connection_ = std::move(connection);
+  Status reason;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!closed_) {
+      connection_ = std::move(connection);
+      return;
+    }
+    reason = *closed_;
+  }
+  connection->close(reason);
 }
 
 void StreamedSession::on_closed(const Status& reason) {
@@ -62,6 +77,12 @@ void StreamedSession::on_closed(const Status& reason) {
 void StreamedSession::on_bound() {
   const std::lock_guard lock(mutex_);
   bound_ = true;
+}
+
+Status StreamedSession::on_unbound() {
+  const std::lock_guard lock(mutex_);
+  bound_ = false;  // until its next hello
+  return absl::OkStatus();
 }
 
 void StreamedSession::on_pose(const transport::SequencedPose& pose) {
@@ -136,6 +157,7 @@ void StreamedSession::close(const Status& reason) {
   std::shared_ptr<transport::MetaConnection> connection;
   {
     const std::lock_guard lock(mutex_);
+    closed_ = reason;
     connection = std::exchange(connection_, nullptr);
   }
   if (connection) connection->close(reason);
@@ -187,7 +209,8 @@ Status StreamedSession::set_rate(double bitrate_bps, double frames_per_second) {
     rate_.bitrate_bps = bitrate_bps;
     rate_.frames_per_second = frames_per_second;
   }
-  return media_->set_rate(id_, bitrate_bps);
+  const Status set = media_->set_rate(id_, bitrate_bps);
+  return absl::IsNotFound(set) ? absl::OkStatus() : set;  // the next client's stream begins with it
 }
 
 RateSplit StreamedSession::rate() const {
@@ -205,10 +228,11 @@ Status StreamedSession::render() {
     TESSERA_ASSIGN_OR_RETURN(renderer_, make_renderer_(settings));
   }
   renderer_->set_rate(work.rate);
-  TESSERA_ASSIGN_OR_RETURN(
-      const double budget,
-      media_->frame_budget_bits(id_, from_seconds(1 / work.rate.frames_per_second), work.key_frame));
-  if (budget <= 0) {  // frames are dropped before they are encoded, never after
+  const StatusOr<double> budget =
+      media_->frame_budget_bits(id_, from_seconds(1 / work.rate.frames_per_second), work.key_frame);
+  if (left(budget.status())) return on_unbound();
+  if (!budget.ok()) return budget.status();
+  if (*budget <= 0) {  // frames are dropped before they are encoded, never after
     if (work.key_frame) on_key_frame_request();
     put_off();
     const std::lock_guard lock(mutex_);
@@ -228,7 +252,7 @@ Status StreamedSession::render() {
   count(frame);
   log_event(spdlog::level::debug, "frame rendered",
             {{"session", id_},
-             {"frame", record.frame},
+             {"frame", frame.number},
              {"key_frame", frame.atlas.key_frame},
              {"atlas_bytes", frame.atlas.bytes.size()},
              {"meta_bytes", frame.meta.size()},
@@ -249,8 +273,9 @@ Status StreamedSession::send(const Work& work, const Frame& frame, FrameRecord r
   record.server.encode = from_ms(times.encode_ms);
   // A client that left meanwhile is no error of this frame: on_closed() tells.
   if (!work.connection->send(FrameType::meta, frame.meta).ok()) return absl::OkStatus();
-  const auto sent =
+  const StatusOr<uint32_t> sent =
       media_->send_frame(id_, record.server.render_begin, frame.atlas.bytes, frame.atlas.key_frame);
+  if (left(sent.status())) return on_unbound();
   record.server.sent = clock_.now();
   on_sent(record);
   if (!absl::IsResourceExhausted(sent.status())) return sent.status();
@@ -270,13 +295,18 @@ void StreamedSession::release() {
   make_renderer_ = {};
 }
 
+void StreamedSession::count_media() {
+  const std::lock_guard lock(mutex_);
+  stats_.media += media_->sender_stats(id_).value_or(transport::RtpSenderStats());
+}
+
 StreamedSessionStats StreamedSession::stats() const {
   const std::lock_guard lock(mutex_);
   StreamedSessionStats stats = stats_;
   stats.connected = connection_ != nullptr;
   for (const auto& [when, bytes] : sent_)
     if (when > clock_.now() - kRateWindowNs) stats.bitrate_bps += 8 * static_cast<double>(bytes);
-  stats.media = media_->sender_stats(id_).value_or(stats.media);
+  stats.media += media_->sender_stats(id_).value_or(transport::RtpSenderStats());
   stats.peer = media_->peer_report(id_);
   return stats;
 }

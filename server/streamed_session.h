@@ -46,14 +46,16 @@ class StreamedSession {
                   OnRendered on_rendered = {});
 
   void on_connected(std::shared_ptr<transport::MetaConnection> connection);
+  // Before its stream is taken from the media port.
+  void count_media();
   void on_closed(const Status& reason);
   void on_bound();
   void on_pose(const transport::SequencedPose& pose);
   void on_key_frame_request();
   Status on_frame(transport::FrameType type, std::span<const uint8_t> payload);
-  // FailedPrecondition: a client is connected already.
+  // FailedPrecondition: a client is connected already. NotFound: close() was called.
   Status admit(const transport::ClientSettings& client);
-  // Tells the client; it sends nothing any more.
+  // Tells the client, also one that is just connecting; it sends nothing any more.
   void close(const Status& reason);
 
   // Both connections stand and a pose is there.
@@ -84,6 +86,7 @@ class StreamedSession {
     bool key_frame = false;
     RateSplit rate;
   };
+  Status on_unbound();
   Status on_timing(std::span<const uint8_t> payload);
   Status answer_ping(std::span<const uint8_t> payload);
   Work take_work();
@@ -111,6 +114,7 @@ class StreamedSession {
   std::deque<FrameRecord> records_;
   uint64_t first_record_ = 0;  // number of records_.front()
   bool admitted_ = false, bound_ = false, key_frame_wanted_ = false, restart_ = false;
+  std::optional<Status> closed_;  // why
   TimeNs due_ns_ = 0;
   RateSplit rate_;
   std::deque<std::pair<TimeNs, uint64_t>> sent_;  // when, bytes; of the last second

@@ -3,23 +3,19 @@
 
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <thread>
 
 #include "client-sdk/client_core.h"
-#include "client-sdk/connection.h"
 #include "client-sdk/display.h"
 #include "codec/yuv.h"
 #include "scene/procedural.h"
 #include "server/session.h"
+#include "streaming_fixture.h"
 
 namespace tessera::server {
 namespace {
 
-using testing::Test;
-
-constexpr DurationNs kDisplayNs = 5 * kNsPerMs;
-constexpr DurationNs kPatienceNs = 60 * kNsPerSecond;  // only a hang takes so long
+using test::kPatienceNs;
 
 // A clock far from the server's.
 class OtherClock final : public Clock {
@@ -54,7 +50,7 @@ class RecordingRenderer final : public FrameRenderer {
   std::vector<Recorded>& log_;
 };
 
-class StreamServerTest : public Test {
+class StreamServerTest : public test::StreamingTest {
  protected:
   static void SetUpTestSuite() {
     auto device = gpu::Device::create({.select = "cpu", .validation = true});
@@ -71,12 +67,6 @@ class StreamServerTest : public Test {
     device_.reset();
   }
 
-  void start(const StreamServerSettings& settings = {}) {
-    auto server = StreamServer::create(settings, clock_);
-    ASSERT_TRUE(server.ok()) << server.status();
-    server_ = *std::move(server);
-  }
-
   static SessionSettings small() {
     SessionSettings s;
     s.layout = atlas::blocks::settings_for(512, 256);
@@ -84,57 +74,8 @@ class StreamServerTest : public Test {
     return s;
   }
 
-  SessionTicket ticket() {
-    auto ticket = server_->create_session(renders(scene_), small());
-    EXPECT_TRUE(ticket.ok()) << ticket.status();
-    return ticket.ok() ? *ticket : SessionTicket{};
-  }
+  SessionTicket ticket() { return StreamingTest::ticket(renders(scene_), small()); }
 
-  StatusOr<std::unique_ptr<client::Connection>> connect(const SessionTicket& ticket) {
-    return connect(ticket, clock_);
-  }
-  StatusOr<std::unique_ptr<client::Connection>> connect(const SessionTicket& ticket, const Clock& clock) {
-    return client::Connection::connect({.meta_port = ticket.meta_port,
-                                        .token = ticket.token,
-                                        .client = {.width = 160,
-                                                   .height = 90,
-                                                   .fov = Fov::symmetric(1.0f, 16.0f / 9.0f),
-                                                   .display_hz = 60,
-                                                   .name = "test"}},
-                                       clock);
-  }
-
-  // A client's display loop until `done`: a pose each time, and what is newest is reported as shown.
-  bool display_until(client::Connection& client, const std::function<bool(const client::Pair*)>& done) {
-    const TimeNs give_up = clock_.now() + kPatienceNs;
-    while (clock_.now() < give_up) {
-      TimedPose pose{clock_.now(), {}};
-      pose.pose.position = dvec3(0, 1.6, 0);
-      client.send_pose(pose);
-      const client::Pair* pair = client.take_newest();
-      if (pair) client.report_displayed(pair->frame, clock_.now());
-      if (done(pair)) return true;
-      std::this_thread::sleep_for(std::chrono::nanoseconds(kDisplayNs));
-    }
-    return false;
-  }
-
-  // Shows `count` pairs, each whole and newer than the one before.
-  void expect_pairs(client::Connection& client, int count) {
-    FrameNumber last = 0;
-    int seen = 0;
-    EXPECT_TRUE(display_until(client, [&](const client::Pair* pair) {
-      if (!pair) return !client.status().ok();
-      EXPECT_EQ(pair->state.frame, pair->frame);
-      EXPECT_GT(pair->frame, last);
-      last = pair->frame;
-      return ++seen == count;
-    }));
-    EXPECT_EQ(seen, count) << client.status();
-  }
-
-  SteadyClock clock_;
-  std::unique_ptr<StreamServer> server_;
   static std::shared_ptr<gpu::Device> device_;
   static std::shared_ptr<SharedScene> scene_;
 };
@@ -171,7 +112,7 @@ TEST_F(StreamServerTest, EveryFramesRecordTilesItsTimeFromPoseToPicture) {
   start();
   const SessionTicket a = ticket();
   const OtherClock clock;
-  auto client = connect(a, clock);
+  auto client = client::Connection::connect(connection(a), clock);
   ASSERT_TRUE(client.ok()) << client.status();
   std::vector<FrameRecord> records;
   uint64_t next = 0;
@@ -363,6 +304,38 @@ TEST_F(StreamServerTest, ScenesComeAndGoWhileSessionsRun) {
     expect_pairs(**client, 2);
   }
   EXPECT_TRUE(absl::IsUnknown(server_->run_on_device([] { return absl::UnknownError("as it is"); })));
+}
+
+// R12: the scene lies on the device once, however many look at it.
+TEST_F(StreamServerTest, FourSessionsShareOneSceneAndTheDevice) {
+  start();
+  const auto memory = [&] {
+    uint64_t bytes = 0;
+    EXPECT_TRUE(server_
+                    ->run_on_device([&] {
+                      bytes = device_->memory_in_use();
+                      return absl::OkStatus();
+                    })
+                    .ok());
+    return static_cast<double>(bytes);
+  };
+  const SessionTicket before = ticket();  // what the scene makes only when it is first drawn
+  frames_of({before}, 3);
+  EXPECT_TRUE(server_->end_session(before.session, "").ok());
+  const double none = memory();
+  const SessionTicket first = ticket();
+  frames_of({first}, 3);
+  const double one = memory();
+  std::vector<SessionTicket> four{first, ticket(), ticket(), ticket()};
+  const std::vector<uint64_t> frames = frames_of(four, 10);
+  const double session = one - none;
+  EXPECT_GT(session, 0);
+  EXPECT_NEAR(memory() - one, 3 * session, 0.02 * session);
+  const auto [least, most] = std::ranges::minmax(frames);
+  EXPECT_GE(least, 10u);
+  EXPECT_LE(static_cast<double>(most), 1.15 * static_cast<double>(least));
+  for (const SessionTicket& ticket : four) EXPECT_TRUE(server_->end_session(ticket.session, "").ok());
+  EXPECT_EQ(memory(), none);
 }
 
 TEST_F(StreamServerTest, SessionsAreLimited) {

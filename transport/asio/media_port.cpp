@@ -274,6 +274,12 @@ BindingStats MediaPort::binding_stats() const {
   return binding_.stats();
 }
 
+std::optional<StreamIds> MediaPort::stream_ids(SessionId session) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = sessions_.find(session);
+  return found == sessions_.end() ? std::nullopt : std::optional(found->second.sender->ids());
+}
+
 std::optional<RtpSenderStats> MediaPort::sender_stats(SessionId session) const {
   const std::lock_guard lock(mutex_);
   const auto found = sessions_.find(session);

@@ -66,6 +66,7 @@ class MediaPort : public std::enable_shared_from_this<MediaPort> {
 
   uint16_t port() const { return socket_->port(); }
   BindingStats binding_stats() const;
+  std::optional<StreamIds> stream_ids(SessionId session) const;
   std::optional<RtpSenderStats> sender_stats(SessionId session) const;
   std::optional<PeerReport> peer_report(SessionId session) const;
   uint64_t dropped_datagrams() const { return socket_->dropped(); }  // the socket's queue was full

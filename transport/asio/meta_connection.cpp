@@ -110,11 +110,11 @@ Status MetaConnection::send(FrameType type, std::span<const uint8_t> payload) {
       return absl::OkStatus();
     }
   }
-  const Status full = absl::ResourceExhaustedError(
+  const Status too_slow = absl::DeadlineExceededError(
       absl::StrCat("the peer takes its data too slowly: more than max_queued_bytes (",
                    settings_.max_queued_bytes, ") would wait for it"));
-  asio::post(stall_timer_.get_executor(), [self = shared_from_this(), full] { self->finish(full); });
-  return full;
+  asio::post(stall_timer_.get_executor(), [self = shared_from_this(), too_slow] { self->finish(too_slow); });
+  return too_slow;
 }
 
 void MetaConnection::enqueue(std::vector<uint8_t> frame) {

@@ -44,8 +44,8 @@ class MetaConnection : public std::enable_shared_from_this<MetaConnection> {
                                                MetaConnectionEvents events);
 
   // Queues a frame; frames keep their order, and wait as long as the peer is slow.
-  // ResourceExhausted: the queue would exceed max_queued_bytes; the connection closes. FailedPrecondition: it
-  // is closed.
+  // DeadlineExceeded: the peer is too slow, the queue would exceed max_queued_bytes; the connection closes.
+  // FailedPrecondition: it is closed.
   Status send(FrameType type, std::span<const uint8_t> payload);
   // Sends what is queued, then a bye (OK, or Cancelled with a reason) or an error frame, then closes.
   void close(Status reason);

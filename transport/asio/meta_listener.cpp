@@ -1,5 +1,8 @@
 #include "transport/asio/meta_listener.h"
 
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
 #include <chrono>
 #include <utility>
 
@@ -10,7 +13,17 @@ namespace tessera::transport {
 namespace {
 
 constexpr size_t kMaxHelloPayload = 256;
+// That the system holds before the peer's window takes them. It would hold megabytes, and a peer that stopped
+// reading a minute ago would seem to take them all.
+constexpr int kMaxUnsentBytes = 64 << 10;
 constexpr auto kAcceptRetry = std::chrono::seconds(1);  // e.g. out of file descriptors
+
+void tune(asio::ip::tcp::socket& socket) {
+  SystemError ignored;
+  socket.set_option(asio::ip::tcp::no_delay(true), ignored);
+  (void)setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kMaxUnsentBytes,
+                   sizeof kMaxUnsentBytes);
+}
 
 }  // namespace
 
@@ -79,8 +92,8 @@ void MetaListener::on_accepted(SystemError error, asio::ip::tcp::socket socket) 
   }
   accept();
   if (waiting_.size() >= settings_.max_waiting) return;  // closes it
+  tune(socket);
   SystemError ignored;
-  socket.set_option(asio::ip::tcp::no_delay(true), ignored);
   const auto remote = socket.remote_endpoint(ignored);
   const asio::any_io_executor strand = socket.get_executor();
   std::unique_ptr<ByteStream> stream =
