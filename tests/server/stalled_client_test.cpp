@@ -70,9 +70,8 @@ TEST_F(StalledClientTest, AClientThatNeverReadsAgainIsLetGo) {
 
   relay_->hold_meta(true);
   const uint64_t sent = server_->stats(stalls.session)->frames_sent;
-  EXPECT_TRUE(display_until(*client_, [&](const client::Pair*) {
-    return !server_->stats(stalls.session)->connected;
-  }));
+  EXPECT_TRUE(display_until(*client_,
+                            [&](const client::Pair*) { return !server_->stats(stalls.session)->connected; }));
   const StreamedSessionStats stats = *server_->stats(stalls.session);
   EXPECT_TRUE(absl::IsDeadlineExceeded(stats.ended)) << stats.ended;
   // Else the system's buffers, not the client, would have taken them.
@@ -92,9 +91,8 @@ TEST_F(StalledClientTest, ItsQueueIsBounded) {
   const SessionTicket stalls = ticket({.moving_objects = 300});
   ASSERT_NO_FATAL_FAILURE(connect_through_relay(stalls));
   relay_->hold_meta(true);
-  EXPECT_TRUE(display_until(*client_, [&](const client::Pair*) {
-    return !server_->stats(stalls.session)->connected;
-  }));
+  EXPECT_TRUE(display_until(*client_,
+                            [&](const client::Pair*) { return !server_->stats(stalls.session)->connected; }));
   const Status ended = server_->stats(stalls.session)->ended;
   EXPECT_EQ(transport::error_code(ended), transport::ErrorCode::too_slow) << ended;
   relay_->hold_meta(false);
