@@ -114,6 +114,7 @@ StatusOr<std::unique_ptr<Daemon>> Daemon::start(const DaemonSettings& settings, 
 
 Daemon::~Daemon() {
   if (impl_->control) impl_->control->drain();
+  if (impl_->streams) impl_->streams->end_all("the daemon is shutting down");  // calls may take their time
   if (impl_->grpc_server) impl_->grpc_server->Shutdown(std::chrono::system_clock::now() + kDrainTime);
   impl_->grpc_server.reset();
   impl_->control.reset();

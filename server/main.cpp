@@ -1,6 +1,10 @@
 // tesserad: renders scenes and streams their shading to many clients.
 #include <CLI/CLI.hpp>
+#include <atomic>
+#include <chrono>
 #include <csignal>
+#include <cstdlib>
+#include <future>
 #include <iostream>
 #include <thread>
 
@@ -16,8 +20,8 @@ enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
 constexpr char kFooter[] =
     R"(Configuration: every option is also an environment variable (--max-sessions = TESSERAD_MAX_SESSIONS) and a key
-of the --config file. Flags win over the file, the file over the environment. SIGTERM and SIGINT end the daemon: clients are
-told.
+of the --config file. Flags win over the file, the file over the environment. SIGTERM and SIGINT end the daemon within 5 s:
+clients are told.
 
 Examples:
   tesserad --scene hall=gallery
@@ -38,8 +42,46 @@ sigset_t block_signals() {
   return signals;
 }
 
+// Waits for a signal beside the daemon, which may be loading a scene just then. Sees to it that the program
+// ends in time.
+class Terminator {
+ public:
+  explicit Terminator(const sigset_t& signals) : thread_([this, signals] { run(signals); }) {}
+  ~Terminator() {
+    ended_.set_value();
+    pthread_kill(thread_.native_handle(), SIGTERM);  // where there was none
+    thread_.join();
+  }
+  // The daemon has started: blocks until a signal comes, then the daemon is to end.
+  void wait() {
+    started_ = true;
+    signalled_.get_future().wait();
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kShutdownTime{4500};
+
+  void run(const sigset_t& signals) {
+    int signal = 0;
+    sigwait(&signals, &signal);
+    std::future<void> ended = ended_.get_future();
+    if (ended.wait_for(std::chrono::seconds(0)) == std::future_status::ready) return;
+    spdlog::info("signal {}: shutting down", signal);
+    if (!started_) std::_Exit(kOk);  // nobody is there to be told
+    signalled_.set_value();
+    if (ended.wait_for(kShutdownTime) == std::future_status::ready) return;
+    spdlog::warn("shutdown: something still runs after {} ms, e.g. a scene loads; ending without it",
+                 kShutdownTime.count());
+    std::_Exit(kOk);
+  }
+
+  std::atomic<bool> started_ = false;
+  std::promise<void> signalled_, ended_;
+  std::thread thread_;  // last: uses all of the above
+};
+
 int serve(const server::DaemonSettings& settings) {
-  const sigset_t signals = block_signals();
+  Terminator terminator(block_signals());
   const SteadyClock clock;
   auto daemon = server::Daemon::start(settings, clock);
   if (!daemon.ok()) {
@@ -48,9 +90,7 @@ int serve(const server::DaemonSettings& settings) {
   }
   spdlog::info("control on {} (gRPC), meta on {} (TCP), media on {} (UDP), at {}", (*daemon)->control_port(),
                (*daemon)->meta_port(), (*daemon)->media_port(), settings.address);
-  int signal = 0;
-  sigwait(&signals, &signal);
-  spdlog::info("signal {}: shutting down", signal);
+  terminator.wait();
   daemon->reset();
   return kOk;
 }

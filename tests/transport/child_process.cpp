@@ -39,6 +39,10 @@ ChildProcess::ChildProcess(const std::string& command_line, const std::string& l
   posix_spawn_file_actions_destroy(&actions);
 }
 
+void ChildProcess::signal(int number) const {
+  kill(pid_, number);
+}
+
 std::optional<int> ChildProcess::exit_code() {
   int status = 0;
   if (!exit_code_ && waitpid(pid_, &status, WNOHANG) == pid_)

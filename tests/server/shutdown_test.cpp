@@ -1,0 +1,149 @@
+// R14: SIGTERM ends tesserad in every state, in time, with exit code 0, and clients are told.
+#include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <fstream>
+#include <regex>
+#include <string>
+#include <thread>
+
+#include "client-sdk/connection.h"
+#include "tessera/v1/control.grpc.pb.h"
+#include "tests/transport/child_process.h"
+#include "transport/asio/asio.h"
+
+namespace tessera::server {
+namespace {
+
+using testing::HasSubstr;
+using transport::test::ChildProcess;
+
+constexpr DurationNs kPatienceNs = 60 * kNsPerSecond;  // only a hang takes so long
+
+class ShutdownTest : public testing::Test {
+ protected:
+  void launch(const std::string& scene) {
+    daemon_ = std::make_unique<ChildProcess>(
+        std::string(TESSERAD) + " --device cpu --control-port 0 --meta-port 0 --media-port 0 --scene " +
+            scene,
+        folder_.file("log"));
+  }
+  bool poll_until(const std::function<bool()>& condition) {
+    const TimeNs give_up = clock_.now() + kPatienceNs;
+    while (!condition()) {
+      if (clock_.now() > give_up) return false;
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));  // between two looks at another process
+    }
+    return true;
+  }
+  std::string log() {
+    const auto bytes = transport::test::read_file(folder_.file("log"));
+    return {bytes.begin(), bytes.end()};
+  }
+  bool serving() {
+    const std::string text = log();
+    std::smatch found;
+    if (!std::regex_search(text, found, std::regex("control on (\\d+) .*meta on (\\d+)"))) return false;
+    control_port_ = std::stoi(found[1]);
+    meta_port_ = static_cast<uint16_t>(std::stoi(found[2]));
+    return true;
+  }
+  // Before that the system's own handling ends the process.
+  bool takes_signals() {
+    std::ifstream status("/proc/" + std::to_string(daemon_->pid()) + "/status");
+    for (std::string line; std::getline(status, line);)
+      if (line.starts_with("SigBlk:")) return std::stoull(line.substr(7), nullptr, 16) >> (SIGTERM - 1) & 1;
+    return false;
+  }
+  void expect_end() {
+    const TimeNs begin = clock_.now();
+    daemon_->signal(SIGTERM);
+    daemon_->signal(SIGTERM);
+    ASSERT_TRUE(poll_until([&] {
+      const bool over = daemon_->exit_code().has_value();
+      if (!over) daemon_->signal(SIGTERM);
+      return over;
+    })) << log();
+    RecordProperty("shutdown_ms", static_cast<int>(to_ms(clock_.now() - begin)));
+    EXPECT_EQ(daemon_->exit_code(), 0) << log();
+  }
+  StatusOr<std::unique_ptr<client::Connection>> connect_client() {
+    const auto control = v1::Control::NewStub(grpc::CreateChannel(
+        "127.0.0.1:" + std::to_string(control_port_), grpc::InsecureChannelCredentials()));
+    grpc::ClientContext context;
+    v1::CreateSessionRequest request;
+    request.set_scene("hall");
+    request.mutable_settings()->set_atlas_width(512);
+    request.mutable_settings()->set_atlas_height(256);
+    v1::Ticket ticket;
+    const grpc::Status created = control->CreateSession(&context, request, &ticket);
+    if (!created.ok()) return absl::UnavailableError(created.error_message());
+    client::ConnectionSettings settings{.meta_port = meta_port_};
+    std::ranges::copy(ticket.token(), settings.token.begin());
+    settings.client = {
+        .width = 160, .height = 90, .fov = Fov::symmetric(1.0f, 16.0f / 9.0f), .display_hz = 60};
+    return client::Connection::connect(settings, clock_);
+  }
+
+  const SteadyClock clock_;
+  transport::test::TemporaryFolder folder_;
+  std::unique_ptr<ChildProcess> daemon_;
+  int control_port_ = 0;
+  uint16_t meta_port_ = 0;
+};
+
+TEST_F(ShutdownTest, WhileItLoads) {
+  launch("city=city:4000000");
+  ASSERT_TRUE(poll_until([&] { return takes_signals(); }));
+  expect_end();
+  EXPECT_THAT(log(), testing::Not(HasSubstr("control on"))) << "it was not loading any more";
+}
+
+TEST_F(ShutdownTest, Idle) {
+  launch("hall=gallery:0");
+  ASSERT_TRUE(poll_until([&] { return serving(); })) << log();
+  expect_end();
+}
+
+TEST_F(ShutdownTest, WhileClientsConnect) {
+  launch("hall=gallery:0");
+  ASSERT_TRUE(poll_until([&] { return serving(); })) << log();
+  namespace asio = transport::asio;
+  asio::io_context io;
+  std::vector<asio::ip::tcp::socket> silent;
+  for (int i = 0; i < 5; ++i) {
+    silent.emplace_back(io);
+    silent.back().connect({asio::ip::address_v4::loopback(), meta_port_});
+  }
+  expect_end();
+}
+
+TEST_F(ShutdownTest, UnderLoadClientsAreTold) {
+  launch("hall=gallery:0");
+  ASSERT_TRUE(poll_until([&] { return serving(); })) << log();
+  std::atomic<int> streaming = 0;
+  std::vector<std::thread> clients;
+  for (int i = 0; i < 4; ++i) {
+    clients.emplace_back([&] {
+      const auto client = connect_client();
+      ASSERT_TRUE(client.ok()) << client.status();
+      bool seen = false;
+      EXPECT_TRUE(poll_until([&] {
+        (*client)->send_pose({clock_.now(), {dvec3(0, 1.6, 0), {1, 0, 0, 0}}});
+        if ((*client)->take_newest() && !std::exchange(seen, true)) ++streaming;
+        return !(*client)->status().ok();
+      }));
+      EXPECT_THAT(std::string((*client)->status().message()), HasSubstr("shutting down"));
+    });
+  }
+  EXPECT_TRUE(poll_until([&] { return streaming == 4; }));
+  expect_end();
+  for (std::thread& client : clients) client.join();
+}
+
+}  // namespace
+}  // namespace tessera::server
