@@ -13,35 +13,37 @@ struct ServerColumn {
   const char* name;
   TimeNs ServerFrameTimes::*value;
 };
-constexpr ServerColumn kServerColumns[] = {
-    {"pose_received_ns", &ServerFrameTimes::pose_received}, {"due_ns", &ServerFrameTimes::due},
-    {"render_begin_ns", &ServerFrameTimes::render_begin},   {"render_end_ns", &ServerFrameTimes::render_end},
-    {"sent_ns", &ServerFrameTimes::sent},                   {"visibility_ns", &ServerFrameTimes::visibility},
-    {"layout_ns", &ServerFrameTimes::layout},               {"shading_ns", &ServerFrameTimes::shading},
-    {"encode_ns", &ServerFrameTimes::encode}};
+constexpr ServerColumn kServerColumns[] = {{"pose_received_ns", &ServerFrameTimes::pose_received},
+                                           {"due_ns", &ServerFrameTimes::due},
+                                           {"render_begin_ns", &ServerFrameTimes::render_begin},
+                                           {"render_end_ns", &ServerFrameTimes::render_end},
+                                           {"sent_ns", &ServerFrameTimes::sent},
+                                           {"visibility_ns", &ServerFrameTimes::visibility},
+                                           {"layout_ns", &ServerFrameTimes::layout},
+                                           {"shading_ns", &ServerFrameTimes::shading},
+                                           {"encode_ns", &ServerFrameTimes::encode}};
 
 struct ClientColumn {
   const char* name;
   TimeNs ClientFrameTimes::*value;
 };
-constexpr ClientColumn kClientColumns[] = {
-    {"atlas_first_packet_ns", &ClientFrameTimes::atlas_first_packet},
-    {"atlas_complete_ns", &ClientFrameTimes::atlas_complete},
-    {"atlas_decode_begin_ns", &ClientFrameTimes::atlas_decode_begin},
-    {"atlas_decoded_ns", &ClientFrameTimes::atlas_decoded},
-    {"meta_complete_ns", &ClientFrameTimes::meta_complete},
-    {"meta_decode_begin_ns", &ClientFrameTimes::meta_decode_begin},
-    {"meta_decoded_ns", &ClientFrameTimes::meta_decoded},
-    {"draw_begin_ns", &ClientFrameTimes::draw_begin},
-    {"displayed_ns", &ClientFrameTimes::displayed},
-    {"clock_offset_ns", &ClientFrameTimes::clock_offset},
-    {"clock_error_ns", &ClientFrameTimes::clock_error}};
+constexpr ClientColumn kClientColumns[] = {{"atlas_first_packet_ns", &ClientFrameTimes::atlas_first_packet},
+                                           {"atlas_complete_ns", &ClientFrameTimes::atlas_complete},
+                                           {"atlas_decode_begin_ns", &ClientFrameTimes::atlas_decode_begin},
+                                           {"atlas_decoded_ns", &ClientFrameTimes::atlas_decoded},
+                                           {"meta_complete_ns", &ClientFrameTimes::meta_complete},
+                                           {"meta_decode_begin_ns", &ClientFrameTimes::meta_decode_begin},
+                                           {"meta_decoded_ns", &ClientFrameTimes::meta_decoded},
+                                           {"draw_begin_ns", &ClientFrameTimes::draw_begin},
+                                           {"displayed_ns", &ClientFrameTimes::displayed},
+                                           {"clock_offset_ns", &ClientFrameTimes::clock_offset},
+                                           {"clock_error_ns", &ClientFrameTimes::clock_error}};
 
 // A track of a trace; its number orders the tracks.
 enum class Track { network_up, server, network_atlas, network_meta, decode_atlas, decode_meta, client };
-constexpr const char* kTrackNames[] = {"network: pose",         "server: frame",        "network: atlas",
-                                       "network: geometry",     "client: decode atlas", "client: decode geometry",
-                                       "client: wait and draw"};
+constexpr const char* kTrackNames[] = {
+    "network: pose",        "server: frame",           "network: atlas",       "network: geometry",
+    "client: decode atlas", "client: decode geometry", "client: wait and draw"};
 
 class Trace {
  public:
@@ -65,7 +67,8 @@ class Trace {
 
  private:
   void name(const char* what, uint64_t session, int track, const std::string& value) {
-    events_.push_back({{"ph", "M"}, {"pid", session}, {"tid", track}, {"name", what}, {"args", {{"name", value}}}});
+    events_.push_back(
+        {{"ph", "M"}, {"pid", session}, {"tid", track}, {"name", what}, {"args", {{"name", value}}}});
   }
 
   TimeNs origin_;
@@ -76,8 +79,10 @@ void add_server(Trace& trace, const FrameRecord& r) {
   const ServerFrameTimes& s = r.server;
   TimeNs at = s.render_begin;
   trace.span(r, Track::server, "frame " + std::to_string(r.frame), s.render_begin, s.sent);
-  for (const auto& [name, duration] : {std::pair("visibility", s.visibility), {"layout", s.layout},
-                                       {"shading", s.shading}, {"encode", s.encode}}) {
+  for (const auto& [name, duration] : {std::pair("visibility", s.visibility),
+                                       {"layout", s.layout},
+                                       {"shading", s.shading},
+                                       {"encode", s.encode}}) {
     trace.span(r, Track::server, name, at, at + duration);
     at += duration;
   }
@@ -115,8 +120,8 @@ void write_csv(std::span<const FrameRecord> records, std::ostream& out) {
   for (const auto& [name, duration] : FrameDurations().named()) out << ',' << name << "_ms";
   out << ",sum_ms,end_to_end_ms,overhead_ms\n";
   for (const FrameRecord& r : records) {
-    out << r.session << ',' << r.frame << ',' << r.key_frame << ',' << r.atlas_bytes << ',' << r.meta_bytes << ','
-        << r.scene_time << ',' << r.pose_sent;
+    out << r.session << ',' << r.frame << ',' << r.key_frame << ',' << r.atlas_bytes << ',' << r.meta_bytes
+        << ',' << r.scene_time << ',' << r.pose_sent;
     for (const ServerColumn& column : kServerColumns) out << ',' << r.server.*column.value;
     for (const ClientColumn& column : kClientColumns) out << ',' << r.client.*column.value;
     const auto d = durations(r);

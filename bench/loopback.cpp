@@ -9,6 +9,7 @@
 #include "base/log.h"
 #include "bench/coverage_meter.h"
 #include "bench/picture_streamer.h"
+#include "bench/real_loopback.h"
 #include "bench/scoring.h"
 #include "bench/shading_streamer.h"
 #include "bench/stream_simulation.h"
@@ -74,7 +75,7 @@ class Loopback {
   Status set_up();
   Status add_baseline(PictureMethod method, const char* note);
   Status draw(Method& method, const DisplayMoment& moment, FramePictures* scored);
-  Status render_truth(const DisplayMoment& moment, FramePictures& pictures, FrameRecord& record);
+  Status render_truth(const DisplayMoment& moment, FramePictures& pictures, DisplayRecord& record);
   // Compares the pictures of the last scored frame, between these two beside whatever else goes on.
   void begin_scoring();
   void end_scoring();
@@ -167,7 +168,7 @@ Status Loopback::draw(Method& method, const DisplayMoment& moment, FramePictures
   return absl::OkStatus();
 }
 
-Status Loopback::render_truth(const DisplayMoment& moment, FramePictures& pictures, FrameRecord& record) {
+Status Loopback::render_truth(const DisplayMoment& moment, FramePictures& pictures, DisplayRecord& record) {
   TESSERA_ASSIGN_OR_RETURN(pictures.truth, truth_->truth(moment.view, moment.path_time_ns));
   const shading::ReferenceImage& truth = *pictures.truth;
   const auto has_triangle = [&](uint32_t triangle) { return ours_->has_patch((*patch_of_)[triangle]); };
@@ -200,7 +201,7 @@ void Loopback::end_scoring() {
   if (!unscored_) return;
   const FrameScore score = scoring_.get();
   const FramePictures& pictures = *unscored_;
-  FrameRecord& record = result_.frames[pictures.index];
+  DisplayRecord& record = result_.frames[pictures.index];
   for (size_t i = 0; i < methods_.size(); ++i) {
     Method& method = methods_[i];
     const ImageError& error = score.methods[i].error;
@@ -245,7 +246,7 @@ Status Loopback::frame(uint32_t index) {
   const bool scored = index % settings_.score_every == 0;
   FramePictures pictures{.index = index};
   FramePictures* const to_score = scored ? &pictures : nullptr;
-  FrameRecord record;
+  DisplayRecord record;
 
   StreamSimulation& simulation = *methods_[0].simulation;
   const uint64_t rendered_before = simulation.frames_rendered();
@@ -256,7 +257,7 @@ Status Loopback::frame(uint32_t index) {
     samples_ += stats.gather.samples;
     ++server_frames_;
   }
-  const FrameTimeline& shown = simulation.shown_frames().back();
+  const FrameRecord& shown = simulation.shown_frames().back();
   record.time_ns = from_seconds(index / settings_.fps);
   record.frame = moment.frame;
   record.age_ms = to_ms(moment.now_ns - shown.pose_sent);
@@ -293,31 +294,9 @@ void Loopback::fill_rows() {
     row.mbps_total = row.mbps_atlas + row.mbps_meta;
     row.client_ms = method.draw_ms / std::max<double>(1, static_cast<double>(row.frames_displayed));
 
-    std::map<std::string, std::vector<double>> durations;
-    std::vector<double> end_to_end;
-    double tiling = 0;
-    FrameNumber newest = 0;
-    for (const FrameTimeline& t : simulation.shown_frames()) {
-      const TimeNs arrived = std::max(t.atlas_delivered, t.meta_delivered);
-      // Decoding and drawing take no virtual time.
-      const std::pair<const char*, DurationNs> parts[] = {{"pose_uplink", t.pose_received - t.pose_sent},
-                                                          {"server_wait", t.render_start - t.pose_received},
-                                                          {"server_render", t.render_end - t.render_start},
-                                                          {"downlink", arrived - t.render_end},
-                                                          {"client_wait", t.shown - arrived}};
-      DurationNs sum = 0;
-      for (const auto& [name, duration] : parts) {
-        durations[name].push_back(to_ms(duration));
-        sum += duration;
-      }
-      end_to_end.push_back(to_ms(t.shown - t.pose_sent));
-      tiling = std::max(tiling, std::abs(to_ms(t.shown - t.pose_sent - sum)));
-      newest = t.number;
-    }
-    for (auto& [name, values] : durations) row.durations_ms[name] = percentiles(std::move(values));
-    row.end_to_end_ms = percentiles(std::move(end_to_end));
-    row.tiling_error_ms_max = tiling;
-    row.frames_lost = newest + 1 - simulation.shown_frames().size();
+    const std::vector<FrameRecord>& shown = simulation.shown_frames();
+    add_durations(shown, row);
+    if (!shown.empty()) row.frames_lost = shown.back().frame + 1 - shown.size();
   }
 
   Row& ours = methods_[0].row;
@@ -332,6 +311,7 @@ void Loopback::fill_rows() {
   ours.peak_rss_mib = peak_rss_mib();
   ours.device_mib = static_cast<double>(device_->memory_peak()) / (1 << 20);
   for (Method& method : methods_) result_.rows.push_back(method.row);
+  result_.records = methods_[0].simulation->shown_frames();
   if (settings_.split) {
     split_.coded = methods_[0].error;
     result_.split = split_.rows();
@@ -376,6 +356,8 @@ StatusOr<LoopbackResult> Loopback::run() {
 }  // namespace
 
 StatusOr<LoopbackResult> run_loopback(const LoopbackSettings& settings, Progress& progress) {
+  if (settings.clock == "real") return run_real_loopback(settings, progress);
+  if (settings.sessions != 1) return absl::InvalidArgumentError("--sessions needs --clock real");
   return Loopback(settings, progress).run();
 }
 

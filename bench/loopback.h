@@ -1,5 +1,5 @@
-// The whole chain in one process and in virtual time: server core → emulated link → client core, every
-// displayed frame beside the truth.
+// The whole chain: in one process and in virtual time (server core → emulated link → client core, every
+// displayed frame beside the truth), or by the real clock (real_loopback.h).
 #pragma once
 
 #include "base/status.h"

@@ -4,7 +4,9 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
+#include "base/frame_trace.h"
 #include "base/log.h"
 #include "bench/culling.h"
 #include "bench/file_io.h"
@@ -29,6 +31,7 @@ constexpr char kLoopbackFooter[] = R"(Examples:
   tessera-bench loopback --scene sponza.glb --path sponza_1.csv --seconds 3 --json sponza.json --report report
   tessera-bench loopback --delay-ms 100 --jitter-ms 10 --loss 0.01 --baselines none
   tessera-bench loopback --pvs none --split off
+  tessera-bench loopback --clock real --sessions 4 --trace trace.json
   tessera-bench loopback --scene city:1000000 --path city --estimate-only)";
 
 int report_failure(const Status& status) {
@@ -44,15 +47,37 @@ std::string command_line(std::string command, const bench::LoopbackSettings& set
   return command;
 }
 
+Status write_frames(const std::string& file, std::span<const FrameRecord> records,
+                    void (*write)(std::span<const FrameRecord>, std::ostream&)) {
+  if (file.empty()) return absl::OkStatus();
+  std::ostringstream out;
+  write(records, out);
+  return bench::write_file(file, out.str());
+}
+
 Status write_outputs(const bench::LoopbackResult& result) {
   if (!result.settings.json.empty()) {
     TESSERA_RETURN_IF_ERROR(bench::write_file(result.settings.json, bench::to_json(result).dump(1) + "\n"));
   }
+  TESSERA_RETURN_IF_ERROR(write_frames(result.settings.frames_csv, result.records, write_csv));
+  TESSERA_RETURN_IF_ERROR(write_frames(result.settings.trace, result.records, write_chrome_trace));
   if (result.settings.report.empty()) return absl::OkStatus();
   TESSERA_RETURN_IF_ERROR(bench::write_run(result.settings.report, result).status());
   TESSERA_RETURN_IF_ERROR(bench::write_report(result.settings.report));
   std::cerr << "report: " << result.settings.report << "/index.html" << std::endl;
   return absl::OkStatus();
+}
+
+void print_latency(const bench::LoopbackResult& result) {
+  for (const bench::Row& row : result.rows) {
+    const double fps = row.server_fps.value_or(0);
+    std::cout << absl::StrFormat("session %d: %.1f server frames/s; ms, p50 / p99:", row.session, fps);
+    for (const auto& [name, p] : row.durations_ms)
+      std::cout << absl::StrFormat(" %s %.1f / %.1f,", name, p.p50, p.p99);
+    std::cout << absl::StrFormat(" end to end %.1f / %.1f; overhead %.2f / %.2f; tiling error at most %.3f\n",
+                                 row.end_to_end_ms->p50, row.end_to_end_ms->p99, row.overhead_ms->p50,
+                                 row.overhead_ms->p99, *row.tiling_error_ms_max);
+  }
 }
 
 void print_summary(const bench::LoopbackResult& result) {
@@ -77,6 +102,7 @@ int run_loopback(const bench::LoopbackSettings& settings) {
   result->settings = settings;
   result->command = command_line("tessera-bench loopback", settings);
   print_summary(*result);
+  if (settings.clock == "real") print_latency(*result);
   const Status written = write_outputs(*result);
   return written.ok() ? kOk : report_failure(written);
 }
@@ -118,8 +144,7 @@ int main(int argc, char** argv) {
       ->envname("TESSERA_BENCH_LOG")
       ->capture_default_str();
 
-  CLI::App* loopback = app.add_subcommand(
-      "loopback", "server → emulated network → client in virtual time, scored frame by frame");
+  CLI::App* loopback = app.add_subcommand("loopback", "server → network → client, scored frame by frame");
   bench::LoopbackSettings settings;
   bench::add_options(*loopback, settings);
   loopback->footer(kLoopbackFooter);

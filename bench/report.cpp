@@ -20,6 +20,8 @@ std::string run_name(const LoopbackSettings& settings) {
   measured.json.clear();
   measured.report.clear();
   measured.truth_cache.clear();
+  measured.frames_csv.clear();
+  measured.trace.clear();
   std::string scene = fs::path(settings.scene).stem().string();
   std::ranges::replace_if(
       scene, [](unsigned char c) { return !std::isalnum(c) && c != '-' && c != '_'; }, '_');

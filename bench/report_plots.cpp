@@ -13,6 +13,7 @@
 
 #include "base/status.h"
 #include "bench/file_io.h"
+#include "bench/temporary_folder.h"
 
 extern char** environ;
 
@@ -153,26 +154,6 @@ std::vector<Series> comparison_series(std::span<const json> runs,
   }
   return series;
 }
-
-// A folder that goes away with the object.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::error_code error;
-    std::string pattern = (std::filesystem::temp_directory_path(error) / "tessera-plot-XXXXXX").string();
-    if (!error && mkdtemp(pattern.data())) path_ = pattern;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 // True if gnuplot ran and found nothing to complain about.
 bool run_gnuplot(const std::string& script_file) {

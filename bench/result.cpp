@@ -51,6 +51,8 @@ json to_json(const Row& row) {
   if (row.overestimation) j["overestimation"] = *row.overestimation;
   if (row.mssim_masked) j["mssim_masked"] = *row.mssim_masked;
   if (row.tiling_error_ms_max) j["tiling_error_ms_max"] = *row.tiling_error_ms_max;
+  if (row.server_fps) j["server_fps"] = *row.server_fps;
+  if (row.overhead_ms) j["overhead_ms"] = to_json(*row.overhead_ms);
   if (row.end_to_end_ms) j["end_to_end_ms"] = to_json(*row.end_to_end_ms);
   for (const auto& [name, p] : row.durations_ms) j["durations_ms"][name] = to_json(p);
   return j;
@@ -64,7 +66,7 @@ json to_json(const SplitRow& row) {
           {"added", row.added}};
 }
 
-json to_json(const FrameRecord& f) {
+json to_json(const DisplayRecord& f) {
   json j{{"time_ns", f.time_ns},         {"frame", f.frame},
          {"age_ms", f.age_ms},           {"holes", f.holes},
          {"atlas_bytes", f.atlas_bytes}, {"meta_bytes", f.meta_bytes}};
@@ -100,6 +102,24 @@ Percentiles percentiles(std::vector<double> values) {
     return std::lerp(values[below], values[above], rank - static_cast<double>(below));
   };
   return {at(0.50), at(0.95), at(0.99)};
+}
+
+void add_durations(std::span<const FrameRecord> records, Row& row) {
+  std::map<std::string, std::vector<double>> values;
+  std::vector<double> end_to_end, overhead;
+  DurationNs tiling = 0;
+  for (const FrameRecord& record : records) {
+    const auto d = durations(record);
+    if (!d) continue;
+    for (const auto& [name, duration] : d->named()) values[std::string(name)].push_back(to_ms(duration));
+    end_to_end.push_back(to_ms(d->end_to_end));
+    overhead.push_back(to_ms(d->overhead));
+    tiling = std::max(tiling, std::abs(d->end_to_end - d->sum()));
+  }
+  for (auto& [name, list] : values) row.durations_ms[name] = percentiles(std::move(list));
+  row.end_to_end_ms = percentiles(std::move(end_to_end));
+  row.overhead_ms = percentiles(std::move(overhead));
+  row.tiling_error_ms_max = to_ms(tiling);
 }
 
 json run_json(const std::string& command, const DeviceDescription& device, const LoopbackSettings& settings) {

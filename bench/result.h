@@ -5,9 +5,11 @@
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "base/frame_record.h"
 #include "base/image.h"
 #include "base/time.h"
 #include "bench/metrics.h"
@@ -40,7 +42,9 @@ struct Row {
   std::map<std::string, Percentiles> durations_ms;  // the eight durations by name
   std::optional<Percentiles> end_to_end_ms;
   std::optional<double> tiling_error_ms_max;
-  double server_ms = 0, client_ms = 0;  // mean compute time of a frame on this machine
+  std::optional<Percentiles> overhead_ms;  // FrameDurations::overhead
+  std::optional<double> server_fps;        // by the real clock
+  double server_ms = 0, client_ms = 0;     // mean compute time of a frame on this machine
   uint64_t samples_shaded = 0;
   double peak_rss_mib = 0, device_mib = 0;
 };
@@ -52,7 +56,7 @@ struct SplitRow {
   double mssim = 0, psnr = 0, added = 0;
 };
 
-struct FrameRecord {
+struct DisplayRecord {
   TimeNs time_ns = 0;  // of display, from the start of scoring
   uint32_t frame = 0;  // server frame that was shown
   double age_ms = 0;   // since the pose for which it was made
@@ -84,11 +88,15 @@ struct LoopbackResult {
   std::string plan;                // frame plan, for people
   std::vector<Row> rows;
   std::vector<SplitRow> split;
-  std::vector<FrameRecord> frames;
-  std::vector<Picture> pictures;  // not part of the JSON
+  std::vector<DisplayRecord> frames;
+  std::vector<FrameRecord> records;  // server frames of all sessions; not part of the JSON
+  std::vector<Picture> pictures;     // not part of the JSON
 };
 
 nlohmann::json to_json(const LoopbackResult& result);
+
+// The durations of the frames that were shown.
+void add_durations(std::span<const FrameRecord> records, Row& row);
 
 // What every run's JSON begins with: how it came about.
 nlohmann::json run_json(const std::string& command, const DeviceDescription& device,

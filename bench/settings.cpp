@@ -33,7 +33,11 @@ void for_each_option(Settings& s, Visitor&& visit) {
   visit("Network", "delay-ms", s.delay_ms, "one way");
   visit("Network", "jitter-ms", s.jitter_ms, "uniform, plus or minus");
   visit("Network", "loss", s.loss, "share of datagrams lost (they are sent again)");
-  visit("Network", "clock", s.clock, "virtual time: one process, no waiting, repeatable");
+  visit("Network", "clock", s.clock,
+        "virtual: one process, no waiting, repeatable; real: daemon and clients as processes over loopback, "
+        "where "
+        "--server-ms, the emulated network, --pvs, --split and --baselines do not apply");
+  visit("Network", "sessions", s.sessions, "clients at a time, with the real clock");
   visit("Network", "seed", s.seed, "of jitter and loss");
   visit("Scoring", "score-every", s.score_every, "score every n-th displayed frame");
   visit("Scoring", "truth", s.truth, "4x supersampled, or 1x");
@@ -43,6 +47,9 @@ void for_each_option(Settings& s, Visitor&& visit) {
         "folder of rendered truth; none = do not keep; default: user cache");
   visit("Output", "json", s.json, "write the result to this file");
   visit("Output", "report", s.report, "add this run to the report in this folder");
+  visit("Output", "frames-csv", s.frames_csv, "write a line for every server frame to this file");
+  visit("Output", "trace", s.trace,
+        "write the frames as a trace for Perfetto or chrome://tracing to this file");
   visit("Output", "estimate-only", s.estimate_only, "print how long the run would take, and stop");
 }
 
@@ -167,7 +174,8 @@ void add_checks(CLI::App& app) {
   check("--delay-ms", CLI::Range(0.0, 10000.0));
   check("--jitter-ms", CLI::Range(0.0, 10000.0));
   check("--loss", CLI::Range(0.0, 0.5));
-  check("--clock", CLI::IsMember({"virtual"}));
+  check("--clock", CLI::IsMember({"virtual", "real"}));
+  check("--sessions", CLI::Range(1, 1024));
   check("--seed", CLI::NonNegativeNumber);
   check("--score-every", CLI::Range(1, 1'000'000));
   check("--baselines", CLI::IsMember({"plain-video", "mesh-warp", "none"}));

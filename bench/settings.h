@@ -55,6 +55,7 @@ struct LoopbackSettings {
   double jitter_ms = 0;  // uniform ±
   double loss = 0;       // share of datagrams
   std::string clock = "virtual";
+  uint32_t sessions = 1;  // with the real clock
   uint64_t seed = 1;
   // Scoring
   uint32_t score_every = 1;  // displayed frames
@@ -63,8 +64,9 @@ struct LoopbackSettings {
   std::vector<std::string> baselines{"plain-video", "mesh-warp"};  // or only `none`
   std::string truth_cache;  // folder; empty = the user's cache folder, `none` = keep nothing
   // Output
-  std::string json;    // file
-  std::string report;  // folder
+  std::string json;               // file
+  std::string report;             // folder
+  std::string frames_csv, trace;  // files of all frame records
   bool estimate_only = false;
 
   bool operator==(const LoopbackSettings&) const = default;

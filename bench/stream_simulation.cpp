@@ -75,9 +75,9 @@ struct StreamSimulation::Impl {
   std::deque<Finished> rendering;  // at most one in practice: the server finishes before its next period
 
   // Client.
-  std::map<uint64_t, FrameNumber> in_flight;  // link message → frame
-  std::map<FrameNumber, FrameTimeline> timelines;
-  std::vector<FrameTimeline> shown;
+  std::map<uint64_t, FrameNumber> in_flight;   // link message → frame
+  std::map<FrameNumber, FrameRecord> records;  // under way
+  std::vector<FrameRecord> shown;
   std::optional<FrameNumber> current;
   DurationNs measured_round_trip = 0;
   std::array<uint64_t, 2> bytes{};  // by channel, since the start
@@ -124,11 +124,19 @@ struct StreamSimulation::Impl {
 
   Status deliver(TimeNs now) {
     for (Delivery& d : down.poll(now)) {
-      FrameTimeline& timeline = timelines[in_flight.extract(d.id).mapped()];
-      (d.channel == Channel::atlas ? timeline.atlas_delivered : timeline.meta_delivered) = d.delivered_ns;
+      note_delivered(records[in_flight.extract(d.id).mapped()].client, d);
       TESSERA_RETURN_IF_ERROR(streamer.deliver(d.channel, d.payload));
     }
     return absl::OkStatus();
+  }
+
+  static void note_delivered(ClientFrameTimes& times, const Delivery& d) {
+    if (d.channel == Channel::atlas) {
+      times.atlas_first_packet = times.atlas_complete = times.atlas_decode_begin = times.atlas_decoded =
+          d.delivered_ns;
+    } else {
+      times.meta_complete = times.meta_decode_begin = times.meta_decoded = d.delivered_ns;
+    }
   }
 
   void receive_poses(TimeNs now) {
@@ -159,12 +167,16 @@ struct StreamSimulation::Impl {
                                .scene_time_ns = path_time(now),
                                .key_frame = std::exchange(key_frame_wanted, false)};
     TESSERA_ASSIGN_OR_RETURN(std::vector<Packet> packets, streamer.serve(request));
-    timelines[number] = {.number = number,
-                         .pose_sent = poses.back().time_ns,
-                         .pose_received = *newest_pose_received,
-                         .render_start = now,
-                         .render_end = ready,
-                         .pose = poses.back().pose};
+    records[number] = {.frame = number,
+                       .scene_time = request.scene_time_ns,
+                       .pose_sent = poses.back().time_ns,
+                       .server = {.pose_received = *newest_pose_received,
+                                  .due = now,
+                                  .render_begin = now,
+                                  .render_end = ready,
+                                  .sent = ready,
+                                  .shading = ready - now},
+                       .client = {.frame = number, .clock_error = 0}};
     rendering.push_back({ready, std::move(packets), number});
     ++rendered;
     return absl::OkStatus();
@@ -173,21 +185,21 @@ struct StreamSimulation::Impl {
   void send_rendered(TimeNs now) {
     Finished finished = std::move(rendering.front());
     rendering.pop_front();
-    FrameTimeline& timeline = timelines[finished.number];
+    FrameRecord& record = records[finished.number];
     for (Packet& packet : finished.packets) {
       const uint64_t size = packet.bytes.size();
-      (packet.channel == Channel::atlas ? timeline.atlas_bytes : timeline.meta_bytes) += size;
+      (packet.channel == Channel::atlas ? record.atlas_bytes : record.meta_bytes) += size;
       if (started) bytes[static_cast<size_t>(packet.channel)] += size;
       in_flight[down.send(now, packet.channel, std::move(packet.bytes))] = finished.number;
     }
   }
 
   void note_shown(TimeNs now, FrameNumber frame) {
-    FrameTimeline timeline = timelines.at(frame);
-    timeline.shown = now;
-    measured_round_trip = now - timeline.pose_sent;
-    shown.push_back(timeline);
-    std::erase_if(timelines, [&](const auto& entry) { return is_newer(frame, entry.first); });
+    FrameRecord record = records.at(frame);
+    record.client.draw_begin = record.client.displayed = now;
+    measured_round_trip = now - record.pose_sent;
+    shown.push_back(record);
+    std::erase_if(records, [&](const auto& entry) { return is_newer(frame, entry.first); });
   }
 
   std::optional<DisplayMoment> display(TimeNs now) {
@@ -247,7 +259,7 @@ StatusOr<DisplayMoment> StreamSimulation::next_display() {
   }
 }
 
-const std::vector<FrameTimeline>& StreamSimulation::shown_frames() const {
+const std::vector<FrameRecord>& StreamSimulation::shown_frames() const {
   return impl_->shown;
 }
 Pose StreamSimulation::pose_at(TimeNs now_ns) const {

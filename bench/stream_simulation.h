@@ -11,20 +11,12 @@
 #include <vector>
 
 #include "base/camera_path.h"
+#include "base/frame_record.h"
 #include "bench/link.h"
 #include "bench/settings.h"
 #include "bench/streamer.h"
 
 namespace tessera::bench {
-
-// When each thing happened to a frame (docs/architecture.md names the durations between them).
-struct FrameTimeline {
-  FrameNumber number = 0;
-  TimeNs pose_sent = 0, pose_received = 0, render_start = 0, render_end = 0;
-  TimeNs atlas_delivered = 0, meta_delivered = 0, shown = 0;
-  uint64_t atlas_bytes = 0, meta_bytes = 0;
-  Pose pose;
-};
 
 // One display frame that counts: the client has a complete frame.
 struct DisplayMoment {
@@ -46,8 +38,9 @@ class StreamSimulation {
   // arrives. DeadlineExceeded if no frame arrives within 60 virtual seconds.
   StatusOr<DisplayMoment> next_display();
 
-  // Frames that were shown so far.
-  const std::vector<FrameTimeline>& shown_frames() const;
+  // Frames that were shown so far. Both ends have one clock; decoding and drawing take no time, and what a
+  // server frame takes is charged to its shading.
+  const std::vector<FrameRecord>& shown_frames() const;
   // Pose on the recorded path at a time of the run (before the start: the path's first pose).
   Pose pose_at(TimeNs now_ns) const;
   uint64_t frames_rendered() const;

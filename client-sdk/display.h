@@ -1,5 +1,4 @@
-// Draws a SceneState with its atlas at the newest pose: EGL surfaceless, OpenGL ES 3.0, 4x MSAA, record per
-// primitive (no vertex buffers: texelFetch(records, gl_VertexID / 3)).
+// A display without a window: Drawer in an OpenGL ES 3.0 context of its own, and pictures on the CPU.
 #pragma once
 
 #include <array>
@@ -12,6 +11,7 @@
 #include "base/status.h"
 #include "base/view.h"
 #include "base/yuv.h"
+#include "client-sdk/drawer.h"
 #include "client-sdk/scene_state.h"
 
 namespace tessera::client {
@@ -19,7 +19,7 @@ namespace tessera::client {
 struct DisplaySettings {
   uint32_t width = 960, height = 540;  // of one eye
   uint32_t samples = 4;
-  std::array<uint8_t, 3> background{135, 168, 205};  // sRGB
+  std::array<uint8_t, 3> background = kDefaultBackground;  // sRGB
 };
 
 // Owns an EGL context; use it from the thread that created it. Several displays may share a thread.
@@ -28,10 +28,9 @@ class Display {
   static StatusOr<std::unique_ptr<Display>> create(const DisplaySettings& settings);
   ~Display();
 
-  // Uploads what changed since the last call with the same object. `atlas` is converted to RGB on the device,
-  // chroma replicated (never filtered across blocks).
+  // See Drawer.
   Status set_atlas(const YuvView& atlas);
-  Status set_atlas(const Image8& atlas);  // uncoded, for the harness
+  Status set_atlas(const Image8& atlas);
   Status set_state(const SceneState& state);
 
   // `view` has the size given in the settings. Draws it into an offscreen framebuffer and reads it back.

@@ -33,7 +33,7 @@ Status check(const VideoSettings& s) {
 StatusOr<std::unique_ptr<VideoEncoder>> open(const Flavour& flavour, const VideoSettings& settings,
                                              std::string choice) {
   TESSERA_ASSIGN_OR_RETURN(auto encoder, LibavEncoder::open(flavour, settings));
-  spdlog::info("Video encoder: {}", choice);
+  spdlog::debug("video encoder: {}", choice);
   encoder->set_choice(std::move(choice));
   return encoder;
 }

@@ -34,8 +34,7 @@ struct AccessUnit {
 // Not thread-safe.
 class VideoEncoder {
  public:
-  // Probes in the order NVENC, VAAPI, x264 for `auto`. What is not there is normal and logged once at info
-  // level.
+  // Probes in the order NVENC, VAAPI, x264 for `auto`. What is not there is normal; choice() tells.
   static StatusOr<std::unique_ptr<VideoEncoder>> create(const VideoSettings& settings);
   virtual ~VideoEncoder() = default;
 

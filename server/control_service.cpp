@@ -4,14 +4,17 @@
 #include <chrono>
 #include <utility>
 
+#include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_replace.h"
 #include "base/log.h"
 #include "proto/frame_record.h"
 #include "server/session.h"
+#include "transport/asio/endpoint.h"
 
 namespace tessera::server {
 namespace {
 
-constexpr std::chrono::milliseconds kWatchInterval{50};  // of frame records
+constexpr uint32_t kFramesIntervalMs = 50;  // of frame records
 
 grpc::Status to_grpc(const Status& status) {
   // The codes have the same numbers.
@@ -23,6 +26,18 @@ Status set_checked(T& value, T otherwise, T low, T high, const char* field) {
   if (value == T{}) value = otherwise;
   if (value >= low && value <= high) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(field, ": is ", value, ", must be ", low, " to ", high));
+}
+
+// gRPC writes "ipv4:127.0.0.1:40000" or "ipv6:%5B::1%5D:40000".
+StatusOr<transport::PeerAddress> caller_address(const std::string& peer, uint16_t port) {
+  const std::string text = absl::StrReplaceAll(peer, {{"%5B", ""}, {"%5D", ""}, {"[", ""}, {"]", ""}});
+  const size_t scheme = text.find(':'), end = text.rfind(':');
+  const auto address = scheme < end ? transport::parse_address(text.substr(scheme + 1, end - scheme - 1))
+                                    : absl::InvalidArgumentError(peer);
+  if (!address.ok())
+    return absl::FailedPreconditionError(
+        absl::StrCat("call by IP: `", peer, "` has no address to forward to"));
+  return transport::peer_address({*address, port});
 }
 
 }  // namespace
@@ -51,16 +66,75 @@ StatusOr<SessionSettings> session_settings(v1::SessionSettings& s) {
   return settings;
 }
 
+// A call that stays open takes a thread.
+class ControlService::Watcher {
+ public:
+  static StatusOr<std::unique_ptr<Watcher>> admit(ControlService& service) {
+    const std::lock_guard lock(service.mutex_);
+    const uint32_t limit = service.info_.limits().max_watchers();
+    if (service.watchers_ >= limit)
+      return absl::ResourceExhaustedError(
+          absl::StrCat(limit, " calls watch or forward already; end one or raise --max-watchers"));
+    ++service.watchers_;
+    return std::unique_ptr<Watcher>(new Watcher(service));
+  }
+  ~Watcher() {
+    const std::lock_guard lock(service_.mutex_);
+    --service_.watchers_;
+  }
+
+ private:
+  explicit Watcher(ControlService& service) : service_(service) {}
+  ControlService& service_;
+};
+
+void ControlService::open() {
+  state_ = State::open;
+}
+
 void ControlService::drain() {
   {
     const std::lock_guard lock(mutex_);
-    draining_ = true;
+    state_ = State::draining;
   }
   drained_.notify_all();
 }
 
 Status ControlService::check_open() const {
-  return draining_ ? absl::UnavailableError("the daemon is shutting down") : absl::OkStatus();
+  switch (state_.load()) {
+    case State::starting:
+      return absl::UnavailableError("the daemon is still loading its scenes; try again");
+    case State::draining:
+      return absl::UnavailableError("the daemon is shutting down");
+    case State::open:
+      break;
+  }
+  return absl::OkStatus();
+}
+
+bool ControlService::wait(uint32_t ms) {
+  std::unique_lock lock(mutex_);
+  return !drained_.wait_for(lock, std::chrono::milliseconds(ms),
+                            [this] { return state_ == State::draining; });
+}
+
+grpc::Status ControlService::answer(const char* call, const Status& status) {
+  if (status.ok()) return grpc::Status::OK;
+  const grpc::Status out = to_grpc(status);
+  const std::lock_guard lock(mutex_);
+  ++refusals_[{call, out.error_code()}];
+  return out;
+}
+
+ControlService::Refusals ControlService::refusals() const {
+  const std::lock_guard lock(mutex_);
+  return refusals_;
+}
+
+grpc::Status ControlService::GetServerInfo(grpc::ServerContext*, const v1::GetServerInfoRequest*,
+                                           v1::ServerInfo* info) {
+  *info = info_;
+  return grpc::Status::OK;
 }
 
 v1::Scene ControlService::describe(const SceneInfo& info) const {
@@ -85,9 +159,9 @@ v1::Scene ControlService::describe(const SceneInfo& info) const {
 
 grpc::Status ControlService::LoadScene(grpc::ServerContext*, const v1::LoadSceneRequest* request,
                                        v1::Scene* scene) {
-  if (const Status open = check_open(); !open.ok()) return to_grpc(open);
+  if (const Status open = check_open(); !open.ok()) return answer("LoadScene", open);
   const StatusOr<SceneInfo> info = scenes_.load(request->name(), request->source());
-  if (!info.ok()) return to_grpc(info.status());
+  if (!info.ok()) return answer("LoadScene", info.status());
   *scene = describe(*info);
   return grpc::Status::OK;
 }
@@ -100,19 +174,19 @@ grpc::Status ControlService::ListScenes(grpc::ServerContext*, const v1::ListScen
 
 grpc::Status ControlService::UnloadScene(grpc::ServerContext*, const v1::UnloadSceneRequest* request,
                                          v1::UnloadSceneResponse*) {
-  return to_grpc(scenes_.unload(request->name()));
+  return answer("UnloadScene", scenes_.unload(request->name()));
 }
 
 grpc::Status ControlService::CreateSession(grpc::ServerContext*, const v1::CreateSessionRequest* request,
                                            v1::Ticket* out) {
-  if (const Status open = check_open(); !open.ok()) return to_grpc(open);
+  if (const Status open = check_open(); !open.ok()) return answer("CreateSession", open);
   Known known{request->scene(), request->settings()};
   const StatusOr<SessionSettings> settings = session_settings(known.settings);
-  if (!settings.ok()) return to_grpc(settings.status());
+  if (!settings.ok()) return answer("CreateSession", settings.status());
   StatusOr<std::shared_ptr<SharedScene>> scene = scenes_.find(request->scene());
-  if (!scene.ok()) return to_grpc(scene.status());
+  if (!scene.ok()) return answer("CreateSession", scene.status());
   const StatusOr<SessionTicket> ticket = server_.create_session(renders(*std::move(scene)), *settings);
-  if (!ticket.ok()) return to_grpc(ticket.status());
+  if (!ticket.ok()) return answer("CreateSession", ticket.status());
   {
     const std::lock_guard lock(mutex_);
     known_[ticket->session] = std::move(known);
@@ -121,7 +195,8 @@ grpc::Status ControlService::CreateSession(grpc::ServerContext*, const v1::Creat
   out->set_token(ticket->token.data(), ticket->token.size());
   out->set_meta_port(ticket->meta_port);
   out->set_media_port(ticket->media_port);
-  spdlog::info("session {}: created for scene {}", ticket->session, request->scene());
+  log_event(spdlog::level::info, "session created",
+            {{"session", ticket->session}, {"scene", request->scene()}});
   return grpc::Status::OK;
 }
 
@@ -141,6 +216,15 @@ StatusOr<v1::Session> ControlService::describe(uint64_t id) {
   session.set_connected(stats->connected);
   session.set_frames_sent(stats->frames_sent);
   session.set_frames_skipped(stats->frames_skipped);
+  session.set_key_frames(stats->key_frames);
+  session.set_bitrate_mbps(stats->bitrate_bps / 1e6);
+  session.set_packets_sent(stats->media.packets);
+  session.set_packets_retransmitted(stats->media.retransmitted);
+  if (stats->peer) {
+    session.set_loss(stats->peer->loss);
+    session.set_jitter_ms(to_ms(stats->peer->jitter_ns));
+  }
+  session.set_encoder(stats->encoder);
   session.set_round_trip_ms(to_ms(stats->round_trip_ns));
   if (!stats->ended.ok()) session.set_last_client_end(std::string(stats->ended.message()));
   return session;
@@ -150,7 +234,7 @@ grpc::Status ControlService::GetSession(grpc::ServerContext*, const v1::GetSessi
                                         v1::Session* session) {
   StatusOr<v1::Session> found = describe(request->session());
   if (found.ok()) *session = *std::move(found);
-  return to_grpc(found.status());
+  return answer("GetSession", found.status());
 }
 
 grpc::Status ControlService::ListSessions(grpc::ServerContext*, const v1::ListSessionsRequest*,
@@ -167,51 +251,120 @@ grpc::Status ControlService::ListSessions(grpc::ServerContext*, const v1::ListSe
   return grpc::Status::OK;
 }
 
+Status ControlService::update(uint64_t session, const v1::SessionSettings& wanted) {
+  v1::SessionSettings merged;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto known = known_.find(session);
+    if (known == known_.end()) return absl::NotFoundError(absl::StrCat("there is no session ", session));
+    merged = known->second.settings;
+  }
+  const v1::SessionSettings before = merged;
+  merged.MergeFrom(wanted);  // what is 0 stays
+  TESSERA_ASSIGN_OR_RETURN(const SessionSettings settings, session_settings(merged));
+  if (merged.atlas_width() != before.atlas_width() || merged.atlas_height() != before.atlas_height())
+    return absl::FailedPreconditionError(absl::StrCat(
+        "settings: the atlas of session ", session, " keeps its ", before.atlas_width(), "x",
+        before.atlas_height(), " texels; create a session with another one and move the client to it"));
+  TESSERA_RETURN_IF_ERROR(
+      server_.set_rate(session, settings.rate.bitrate_bps, settings.rate.frames_per_second));
+  log_event(spdlog::level::info, "session updated",
+            {{"session", session},
+             {"bitrate_mbps", merged.bitrate_mbps()},
+             {"frames_per_second", merged.frames_per_second()}});
+  const std::lock_guard lock(mutex_);
+  if (const auto known = known_.find(session); known != known_.end()) known->second.settings = merged;
+  return absl::OkStatus();
+}
+
+grpc::Status ControlService::UpdateSession(grpc::ServerContext*, const v1::UpdateSessionRequest* request,
+                                           v1::Session* session) {
+  if (const Status updated = update(request->session(), request->settings()); !updated.ok())
+    return answer("UpdateSession", updated);
+  StatusOr<v1::Session> found = describe(request->session());
+  if (found.ok()) *session = *std::move(found);
+  return answer("UpdateSession", found.status());
+}
+
 grpc::Status ControlService::DeleteSession(grpc::ServerContext*, const v1::DeleteSessionRequest* request,
                                            v1::DeleteSessionResponse*) {
   const Status ended = server_.end_session(request->session(), request->reason());
-  const std::lock_guard lock(mutex_);
-  known_.erase(request->session());
-  return to_grpc(ended);
+  {
+    const std::lock_guard lock(mutex_);
+    known_.erase(request->session());
+  }
+  return answer("DeleteSession", ended);
+}
+
+Status ControlService::watch(grpc::ServerContext* context, const v1::WatchSessionRequest& request,
+                             grpc::ServerWriter<v1::Session>& writer) {
+  uint32_t interval_ms = request.interval_ms();
+  TESSERA_RETURN_IF_ERROR(set_checked(interval_ms, 1000u, 10u, 60'000u, "interval_ms"));
+  TESSERA_ASSIGN_OR_RETURN(const auto watcher, Watcher::admit(*this));
+  do {
+    TESSERA_ASSIGN_OR_RETURN(const v1::Session session, describe(request.session()));
+    if (!writer.Write(session)) break;
+  } while (wait(interval_ms) && !context->IsCancelled());
+  return absl::OkStatus();
 }
 
 grpc::Status ControlService::WatchSession(grpc::ServerContext* context,
                                           const v1::WatchSessionRequest* request,
                                           grpc::ServerWriter<v1::Session>* writer) {
-  uint32_t interval_ms = request->interval_ms();
-  if (const Status fits = set_checked(interval_ms, 1000u, 10u, 60'000u, "interval_ms"); !fits.ok())
-    return to_grpc(fits);
-  while (!context->IsCancelled() && !draining_) {
-    const StatusOr<v1::Session> session = describe(request->session());
-    if (!session.ok()) return to_grpc(session.status());
-    if (!writer->Write(*session)) break;
-    wait(std::chrono::milliseconds(interval_ms));
-  }
-  return grpc::Status::OK;
+  return answer("WatchSession", watch(context, *request, *writer));
 }
 
-void ControlService::wait(std::chrono::milliseconds time) {
-  std::unique_lock lock(mutex_);
-  drained_.wait_for(lock, time, [this] { return draining_.load(); });
+Status ControlService::watch_frames(grpc::ServerContext* context, const v1::WatchFramesRequest& request,
+                                    grpc::ServerWriter<v1::FrameRecord>& writer) {
+  TESSERA_ASSIGN_OR_RETURN(const auto watcher, Watcher::admit(*this));
+  uint64_t next = request.first();
+  do {
+    TESSERA_ASSIGN_OR_RETURN(const std::vector<FrameRecord> records,
+                             server_.records(request.session(), next, next));
+    uint64_t index = next - records.size();
+    for (const FrameRecord& record : records) {
+      v1::FrameRecord message;
+      write(record, message);
+      message.set_index(index++);
+      if (!writer.Write(message)) return absl::OkStatus();
+    }
+  } while (!request.once() && wait(kFramesIntervalMs) && !context->IsCancelled());
+  return absl::OkStatus();
 }
 
 grpc::Status ControlService::WatchFrames(grpc::ServerContext* context, const v1::WatchFramesRequest* request,
                                          grpc::ServerWriter<v1::FrameRecord>* writer) {
-  uint64_t next = request->first();
-  while (!context->IsCancelled() && !draining_) {
-    const auto records = server_.records(request->session(), next, next);
-    if (!records.ok()) return to_grpc(records.status());
-    uint64_t index = next - records->size();
-    for (const FrameRecord& record : *records) {
-      v1::FrameRecord message;
-      write(record, message);
-      message.set_index(index++);
-      if (!writer->Write(message)) return grpc::Status::OK;
-    }
-    if (request->once()) break;
-    wait(kWatchInterval);
-  }
-  return grpc::Status::OK;
+  return answer("WatchFrames", watch_frames(context, *request, *writer));
+}
+
+// To nowhere but the caller's own address: else whoever reaches this port could flood any other.
+Status ControlService::forward(grpc::ServerContext* context, const v1::ForwardStreamRequest& request,
+                               grpc::ServerWriter<v1::Forwarding>& writer) {
+  constexpr uint32_t kIntervalMs = 1000;
+  if (request.port() < 1024 || request.port() > 65535)
+    return absl::InvalidArgumentError(absl::StrCat("port: is ", request.port(), ", must be 1024 to 65535"));
+  TESSERA_ASSIGN_OR_RETURN(const transport::PeerAddress to,
+                           caller_address(context->peer(), static_cast<uint16_t>(request.port())));
+  TESSERA_ASSIGN_OR_RETURN(const auto watcher, Watcher::admit(*this));
+  TESSERA_ASSIGN_OR_RETURN(const Forwarding forwarding, server_.forward(request.session(), to));
+  const absl::Cleanup end = [&] { server_.end_forward(forwarding); };
+  log_event(spdlog::level::info, "stream forwarded",
+            {{"session", request.session()}, {"to", transport::to_string(to)}, {"port", to.port}});
+  v1::Forwarding message;
+  message.set_sdp(forwarding.sdp);
+  do {
+    TESSERA_ASSIGN_OR_RETURN(const uint64_t packets, server_.forwarded_packets(forwarding));
+    message.set_packets(packets);
+    if (!writer.Write(message)) break;
+    message.clear_sdp();
+  } while (wait(kIntervalMs) && !context->IsCancelled());
+  return absl::OkStatus();
+}
+
+grpc::Status ControlService::ForwardStream(grpc::ServerContext* context,
+                                           const v1::ForwardStreamRequest* request,
+                                           grpc::ServerWriter<v1::Forwarding>* writer) {
+  return answer("ForwardStream", forward(context, *request, *writer));
 }
 
 }  // namespace tessera::server

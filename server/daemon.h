@@ -3,31 +3,46 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/status.h"
 #include "base/time.h"
+#include "server/stream_server.h"
 
 namespace tessera::server {
 
 struct DaemonSettings {
-  std::string address = "127.0.0.1";     // of all three ports, in numbers
-  uint16_t control_port = 7310;          // gRPC; 0: a free one
-  uint16_t meta_port = 7311;             // TCP; likewise
-  uint16_t media_port = 7312;            // UDP; likewise
+  std::string address = "127.0.0.1";  // of all ports, in numbers
+  uint16_t control_port = 7310;       // gRPC; 0: a free one
+  uint16_t meta_port = 7311;          // TCP; likewise
+  uint16_t media_port = 7312;         // UDP; likewise
+  uint16_t http_port = 7313;          // metrics and health; likewise
+  bool no_http = false;
   std::string tls_certificate, tls_key;  // PEM files; both or none
   bool insecure = false;                 // other addresses than loopback in clear text
   uint32_t max_sessions = 32;
-  std::vector<std::string> scenes;  // NAME=SOURCE, loaded at the start
-  std::string scene_root;           // where LoadScene may read files; empty: nowhere
+  uint32_t max_atlas_mtexels = 128;  // 2^20 texels, of all sessions together
+  uint32_t max_scene_mib = 0;        // device memory of all scenes together; 0: what the device has
+  uint32_t max_watchers = 64;        // calls that stay open
+  std::vector<std::string> scenes;   // NAME=SOURCE, loaded at the start
+  std::string scene_root;            // where LoadScene may read files; empty: nowhere
   std::string device = "cpu";
 
   bool operator==(const DaemonSettings&) const = default;
 };
 
+// InvalidArgument: only one of the two TLS files, one that does not fit, or clear text beyond loopback
+// without `insecure`.
+StatusOr<StreamServerSettings> stream_settings(const DaemonSettings& settings);
+// Of a scene option. InvalidArgument: not NAME=SOURCE.
+StatusOr<std::pair<std::string, std::string>> name_and_source(const std::string& scene);
+const char* version();
+
 class Daemon {
  public:
-  // Serves once it returns. `clock` outlives the daemon.
+  // Serves once it returns; /healthz and /readyz answer from its first moments on. `clock` outlives the
+  // daemon.
   static StatusOr<std::unique_ptr<Daemon>> start(const DaemonSettings& settings, const Clock& clock);
   // Lets nothing new in, tells the clients, and ends within a few seconds.
   ~Daemon();
@@ -35,6 +50,7 @@ class Daemon {
   uint16_t control_port() const;
   uint16_t meta_port() const;
   uint16_t media_port() const;
+  uint16_t http_port() const;  // 0: none
 
  private:
   struct Impl;

@@ -11,7 +11,13 @@ class App;
 
 namespace tessera::server {
 
+struct LogSettings {
+  std::string level = "info";
+  std::string format = "text";
+  bool operator==(const LogSettings&) const = default;
+};
+
 // Both must outlive the parse, and give the defaults.
-void add_options(CLI::App& app, DaemonSettings& settings, std::string& log_level);
+void add_options(CLI::App& app, DaemonSettings& settings, LogSettings& log);
 
 }  // namespace tessera::server

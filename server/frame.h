@@ -68,6 +68,9 @@ class FrameRenderer {
   virtual ~FrameRenderer() = default;
   // Blocks until the frame is encoded. The first frame is a key frame.
   virtual StatusOr<Frame> render(const FrameInput& input) = 0;
+  // For the frames from now on.
+  virtual void set_rate(const RateSplit& rate) = 0;
+  virtual const std::string& encoder() const = 0;  // which one runs, and why
 };
 
 // Called on the render thread, once the client's view is known. It holds what the renderer is made of; where

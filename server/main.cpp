@@ -4,13 +4,14 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
-#include <future>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "base/log.h"
 #include "server/daemon.h"
 #include "server/daemon_options.h"
+#include "server/doctor.h"
 
 namespace {
 
@@ -20,16 +21,21 @@ enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
 constexpr char kFooter[] =
     R"(Configuration: every option is also an environment variable (--max-sessions = TESSERAD_MAX_SESSIONS) and a key
-of the --config file. Flags win over the file, the file over the environment. SIGTERM and SIGINT end the daemon within 5 s:
-clients are told.
+of the --config file. Flags win over the file, the file over the environment. SIGTERM and SIGINT end the daemon: clients are
+told.
 
 Examples:
   tesserad --scene hall=gallery
   tesserad --scene sponza=sponza.glb --scene-root /srv/scenes --max-sessions 8
   tesserad --address 0.0.0.0 --tls-certificate server.pem --tls-key server.key --scene hall=gallery
   tesserad --config tesserad.toml --check-config
+  tesserad --config tesserad.toml doctor         # would it start? if not, what to do
+  tesserad --print-config > tesserad.toml        # every option with its default
+  curl http://127.0.0.1:7313/readyz              # and /metrics, /healthz
 
-Exit codes: 0 ended by a signal, 1 could not start, 2 wrong usage.)";
+Exit codes: 0 ended by a signal, or what was asked for is done; 1 could not start, or doctor found a fault; 2 wrong usage.)";
+
+constexpr std::chrono::milliseconds kShutdownTime{4500};
 
 // Signals are taken by whoever waits for them, in no other thread.
 sigset_t block_signals() {
@@ -42,57 +48,50 @@ sigset_t block_signals() {
   return signals;
 }
 
-// Waits for a signal beside the daemon, which may be loading a scene just then. Sees to it that the program
-// ends in time.
-class Terminator {
- public:
-  explicit Terminator(const sigset_t& signals) : thread_([this, signals] { run(signals); }) {}
-  ~Terminator() {
-    ended_.set_value();
-    pthread_kill(thread_.native_handle(), SIGTERM);  // where there was none
-    thread_.join();
-  }
-  // The daemon has started: blocks until a signal comes, then the daemon is to end.
-  void wait() {
-    started_ = true;
-    signalled_.get_future().wait();
-  }
-
- private:
-  static constexpr std::chrono::milliseconds kShutdownTime{4500};
-
-  void run(const sigset_t& signals) {
+int serve(const server::DaemonSettings& settings) {
+  const sigset_t signals = block_signals();
+  const SteadyClock clock;
+  std::atomic<bool> serving = false;
+  std::jthread waits_for_signal([&] {
     int signal = 0;
     sigwait(&signals, &signal);
-    std::future<void> ended = ended_.get_future();
-    if (ended.wait_for(std::chrono::seconds(0)) == std::future_status::ready) return;
-    spdlog::info("signal {}: shutting down", signal);
-    if (!started_) std::_Exit(kOk);  // nobody is there to be told
-    signalled_.set_value();
-    if (ended.wait_for(kShutdownTime) == std::future_status::ready) return;
-    spdlog::warn("shutdown: something still runs after {} ms, e.g. a scene loads; ending without it",
-                 kShutdownTime.count());
-    std::_Exit(kOk);
-  }
-
-  std::atomic<bool> started_ = false;
-  std::promise<void> signalled_, ended_;
-  std::thread thread_;  // last: uses all of the above
-};
-
-int serve(const server::DaemonSettings& settings) {
-  Terminator terminator(block_signals());
-  const SteadyClock clock;
+    log_event(spdlog::level::info, "shutting down", {{"signal", signal}});
+    if (!serving) std::_Exit(kOk);  // scenes are loading, and nobody is connected
+  });
   auto daemon = server::Daemon::start(settings, clock);
   if (!daemon.ok()) {
     std::cerr << "tesserad: " << daemon.status().message() << std::endl;
-    return kFailed;
+    std::_Exit(kFailed);  // past the thread that waits
   }
-  spdlog::info("control on {} (gRPC), meta on {} (TCP), media on {} (UDP), at {}", (*daemon)->control_port(),
-               (*daemon)->meta_port(), (*daemon)->media_port(), settings.address);
-  terminator.wait();
+  log_event(spdlog::level::info, "serving",
+            {{"address", settings.address},
+             {"control_port", (*daemon)->control_port()},
+             {"meta_port", (*daemon)->meta_port()},
+             {"media_port", (*daemon)->media_port()},
+             {"http_port", (*daemon)->http_port()}});
+  serving = true;
+  waits_for_signal.join();
+  std::thread([] {
+    std::this_thread::sleep_for(kShutdownTime);
+    log_event(spdlog::level::warn, "shutdown cut short", {{"reason", "a call still runs"}});
+    std::_Exit(kOk);
+  }).detach();  // nothing stops a call that is loading a scene
   daemon->reset();
   return kOk;
+}
+
+int print_findings(const server::DaemonSettings& settings, bool json) {
+  bool well = true;
+  auto list = nlohmann::json::array();
+  for (const server::Finding& finding : server::examine(settings)) {
+    const std::string text = finding.status.ok() ? finding.detail : std::string(finding.status.message());
+    well = well && finding.status.ok();
+    list.push_back({{"check", finding.check}, {"ok", finding.status.ok()}, {"detail", text}});
+    if (!json)
+      std::cout << (finding.status.ok() ? "ok      " : "failed  ") << finding.check << ": " << text << "\n";
+  }
+  if (json) std::cout << nlohmann::json{{"ok", well}, {"checks", list}}.dump(1) << "\n";
+  return well ? kOk : kFailed;
 }
 
 }  // namespace
@@ -102,9 +101,15 @@ int main(int argc, char** argv) {
   app.footer(kFooter);
   app.set_config("--config", "", "read options from this TOML or INI file");
   server::DaemonSettings settings;
-  std::string log_level = "info";
-  bool check_config = false, print_config = false;
-  server::add_options(app, settings, log_level);
+  server::LogSettings log;
+  bool json = false, check_config = false, print_config = false;
+  server::add_options(app, settings, log);
+  app.set_version_flag("--version", std::string("tesserad ") + server::version());
+  app.get_option("--version")->configurable(false);
+  CLI::App* doctor =
+      app.add_subcommand("doctor", "check whether the daemon would start with these options, and stop");
+  doctor->fallthrough()->configurable(false);
+  doctor->add_flag("--json", json, "for machines")->configurable(false);
   app.add_flag("--check-config", check_config, "read all options, say whether they are right, and stop")
       ->configurable(false);
   app.add_flag("--print-config", print_config, "print the options in force as a config file, and stop")
@@ -114,7 +119,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kOk : kUsage;
   }
-  init_logging(log_level);
+  init_logging(log.level, log.format == "json" ? LogFormat::json : LogFormat::text);
   if (print_config) {
     std::cout << app.config_to_str(true, true);
     return kOk;
@@ -123,5 +128,6 @@ int main(int argc, char** argv) {
     std::cout << "the configuration is right\n";
     return kOk;
   }
+  if (*doctor) return print_findings(settings, json);
   return serve(settings);
 }

@@ -26,8 +26,9 @@ StatusOr<std::shared_ptr<scene::Scene>> import(const std::string& source, scene:
 
 }  // namespace
 
-SceneLibrary::SceneLibrary(std::shared_ptr<gpu::Device> device, StreamServer& server, fs::path root)
-    : device_(std::move(device)), server_(server), root_(std::move(root)) {}
+SceneLibrary::SceneLibrary(std::shared_ptr<gpu::Device> device, StreamServer& server, fs::path root,
+                           uint32_t max_device_mib)
+    : device_(std::move(device)), server_(server), root_(std::move(root)), max_device_mib_(max_device_mib) {}
 
 SceneLibrary::~SceneLibrary() {
   (void)server_.run_on_device([this] {
@@ -60,12 +61,7 @@ StatusOr<SceneInfo> SceneLibrary::load(const std::string& name, const std::strin
 
 StatusOr<SceneInfo> SceneLibrary::load_trusted(const std::string& name, const std::string& source) {
   TESSERA_RETURN_IF_ERROR(check_name(name));
-  {
-    const std::lock_guard lock(mutex_);
-    if (!entries_.try_emplace(name).second)
-      return absl::AlreadyExistsError(
-          absl::StrCat("there is a scene ", name, "; unload it or choose another name"));
-  }
+  TESSERA_RETURN_IF_ERROR(reserve(name));
   StatusOr<Entry> entry = make(name, source);
   const std::lock_guard lock(mutex_);
   if (!entry.ok()) {
@@ -73,6 +69,25 @@ StatusOr<SceneInfo> SceneLibrary::load_trusted(const std::string& name, const st
     return entry.status();
   }
   return (entries_[name] = *std::move(entry)).info;
+}
+
+Status SceneLibrary::reserve(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  if (entries_.contains(name))
+    return absl::AlreadyExistsError(
+        absl::StrCat("there is a scene ", name, "; unload it or choose another name"));
+  const auto loading = std::ranges::count_if(entries_, [](const auto& e) { return !e.second.scene; });
+  if (static_cast<size_t>(loading) >= kMaxLoading)
+    return absl::ResourceExhaustedError(absl::StrCat(loading, " scenes are loading; try again later"));
+  entries_.try_emplace(name);
+  return absl::OkStatus();
+}
+
+double SceneLibrary::room_mib() const {
+  const std::lock_guard lock(mutex_);
+  double room = max_device_mib_;
+  for (const auto& [name, entry] : entries_) room -= entry.info.device_mib;
+  return room;
 }
 
 // Reading goes on beside the streaming; only the upload holds it up.
@@ -89,7 +104,18 @@ StatusOr<SceneLibrary::Entry> SceneLibrary::make(const std::string& name, const 
     const uint64_t before = device_->memory_in_use();
     TESSERA_ASSIGN_OR_RETURN(entry.scene, SharedScene::create(device_, scene));
     entry.info.device_mib = static_cast<double>(device_->memory_in_use() - before) / (1 << 20);
-    return absl::OkStatus();
+    const double room = room_mib();  // others may have come in meanwhile
+    if (max_device_mib_ == 0 || entry.info.device_mib <= room) {
+      const std::lock_guard lock(mutex_);
+      entries_[name].info.device_mib = entry.info.device_mib;
+      return absl::OkStatus();
+    }
+    entry.scene.reset();
+    return absl::ResourceExhaustedError(
+        absl::StrFormat("scene %s takes %.1f MiB of the device, of which --max-scene-mib %u leaves %.1f; "
+                        "unload a scene or raise "
+                        "it",
+                        name, entry.info.device_mib, max_device_mib_, room));
   }));
   return entry;
 }

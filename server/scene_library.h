@@ -27,11 +27,13 @@ struct SceneInfo {
 class SceneLibrary {
  public:
   // `root`: files that load() may read lie below it; empty: only procedural scenes.
-  SceneLibrary(std::shared_ptr<gpu::Device> device, StreamServer& server, std::filesystem::path root);
+  // `max_device_mib`: of all scenes together; 0: no limit.
+  SceneLibrary(std::shared_ptr<gpu::Device> device, StreamServer& server, std::filesystem::path root,
+               uint32_t max_device_mib);
   ~SceneLibrary();
 
   // InvalidArgument: a name that is not 1..64 of [A-Za-z0-9._-], or a source outside the root. AlreadyExists.
-  // Else what the import says.
+  // ResourceExhausted: max_device_mib, or kMaxLoading. Else what the import says.
   StatusOr<SceneInfo> load(const std::string& name, const std::string& source);
   // The operator's own: any file.
   StatusOr<SceneInfo> load_trusted(const std::string& name, const std::string& source);
@@ -40,6 +42,7 @@ class SceneLibrary {
   // NotFound; FailedPrecondition: sessions use it.
   Status unload(const std::string& name);
   std::vector<SceneInfo> list() const;
+  static constexpr size_t kMaxLoading = 4;  // at a time: each takes memory while it is read
 
  private:
   struct Entry {
@@ -47,11 +50,14 @@ class SceneLibrary {
     std::shared_ptr<SharedScene> scene;  // empty while it loads
   };
   StatusOr<std::string> inside_root(const std::string& source) const;
+  Status reserve(const std::string& name);
   StatusOr<Entry> make(const std::string& name, const std::string& source);
+  double room_mib() const;
 
   const std::shared_ptr<gpu::Device> device_;
   StreamServer& server_;
   const std::filesystem::path root_;
+  const uint32_t max_device_mib_;
   mutable std::mutex mutex_;
   std::map<std::string, Entry> entries_;
 };

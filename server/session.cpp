@@ -141,8 +141,11 @@ StatusOr<std::unique_ptr<Session>> Session::create(std::shared_ptr<SharedScene> 
   impl->settings = settings;
   impl->scene = std::move(scene);
   TESSERA_RETURN_IF_ERROR(impl->set_up());
-  spdlog::info("session: encoder {}", impl->encoder->choice());
   return std::unique_ptr<Session>(new Session(std::move(impl)));
+}
+
+void Session::set_rate(const RateSplit& rate) {
+  impl_->settings.rate = rate;
 }
 
 StatusOr<Frame> Session::render(const FrameInput& input) {

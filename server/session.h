@@ -20,10 +20,11 @@ class Session final : public FrameRenderer {
                                                    const SessionSettings& settings);
   ~Session() override;
 
+  void set_rate(const RateSplit& rate) override;
   StatusOr<Frame> render(const FrameInput& input) override;
 
   const FramePlan& plan() const;
-  const std::string& encoder() const;  // which one runs, and why
+  const std::string& encoder() const override;
 
   // State of the last rendered frame, for harnesses.
   std::span<const View> views() const;         // predicted

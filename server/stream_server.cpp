@@ -14,6 +14,7 @@
 
 #include "base/log.h"
 #include "transport/asio/endpoint.h"
+#include "transport/sdp.h"
 
 namespace tessera::server {
 namespace {
@@ -21,16 +22,6 @@ namespace {
 namespace asio = transport::asio;
 using transport::SessionId;
 using transport::SessionToken;
-
-Status check_exposure(const StreamServerSettings& settings) {
-  TESSERA_ASSIGN_OR_RETURN(const asio::ip::address media, transport::parse_address(settings.media.address));
-  TESSERA_ASSIGN_OR_RETURN(const asio::ip::address meta, transport::parse_address(settings.meta.address));
-  if (settings.insecure || (media.is_loopback() && meta.is_loopback())) return absl::OkStatus();
-  if (settings.meta.tls) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
-      "binding ", settings.meta.address, " and ", settings.media.address,
-      " would send tokens and pictures in clear text: give a TLS certificate, or say --insecure"));
-}
 
 Status fill_random(std::span<uint8_t> out) {
   if (RAND_bytes(out.data(), static_cast<int>(out.size())) != 1)
@@ -40,6 +31,18 @@ Status fill_random(std::span<uint8_t> out) {
 
 Status no_such_session(SessionId id) {
   return absl::NotFoundError(absl::StrCat("there is no session ", id));
+}
+
+void add_counters(StreamedSessionStats& sum, const StreamedSessionStats& s) {
+  sum.frames_sent += s.frames_sent;
+  sum.frames_skipped += s.frames_skipped;
+  sum.key_frames += s.key_frames;
+  sum.meta_bytes += s.meta_bytes;
+  sum.media += s.media;
+}
+
+uint64_t texels(const SessionSettings& settings) {
+  return uint64_t{settings.layout.width} * settings.layout.height;
 }
 
 struct Entry {
@@ -54,11 +57,11 @@ struct MediaStream {
   std::optional<transport::SrtpKeys> srtp;
 };
 
-StatusOr<MediaStream> make_stream(const SessionSettings& settings, bool encrypted) {
+StatusOr<MediaStream> make_stream(double bitrate_bps, bool encrypted) {
   MediaStream stream;
   std::array<uint8_t, 8> seed{};
   TESSERA_RETURN_IF_ERROR(fill_random(seed));
-  transport::RtpSenderSettings rtp{.pacer = {.rate_bps = settings.rate.bitrate_bps}};
+  transport::RtpSenderSettings rtp{.pacer = {.rate_bps = bitrate_bps}};
   std::copy(seed.begin(), seed.end(), reinterpret_cast<uint8_t*>(&rtp.seed));
   TESSERA_ASSIGN_OR_RETURN(stream.sender, transport::RtpSender::create(rtp));
   if (encrypted) {
@@ -71,6 +74,16 @@ StatusOr<MediaStream> make_stream(const SessionSettings& settings, bool encrypte
 
 }  // namespace
 
+Status check_exposure(const StreamServerSettings& settings) {
+  TESSERA_ASSIGN_OR_RETURN(const asio::ip::address media, transport::parse_address(settings.media.address));
+  TESSERA_ASSIGN_OR_RETURN(const asio::ip::address meta, transport::parse_address(settings.meta.address));
+  if (settings.insecure || (media.is_loopback() && meta.is_loopback())) return absl::OkStatus();
+  if (settings.meta.tls) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "binding ", settings.meta.address, " and ", settings.media.address,
+      " would send tokens and pictures in clear text: give a TLS certificate, or say --insecure"));
+}
+
 struct StreamServer::Impl {
   Impl(const StreamServerSettings& s, const Clock& c) : settings(s), clock(c), work(io.get_executor()) {}
 
@@ -82,8 +95,9 @@ struct StreamServer::Impl {
   StatusOr<transport::Admission> admit(const transport::Hello& hello, const std::string& peer);
   StatusOr<Entry> find_token(const SessionToken& token) const;
   StatusOr<transport::Welcome> open_media(const Entry& entry);
-  void on_left(StreamedSession& session, const Status& reason);
   transport::MediaSessionEvents media_events(const std::shared_ptr<StreamedSession>& session);
+  Status check_room(const SessionSettings& wanted) const;
+  void refuse(const Status& reason, const std::string& peer);
   StatusOr<std::shared_ptr<StreamedSession>> find(SessionId id) const;
   std::shared_ptr<StreamedSession> take(SessionId id);
   Status end(SessionId id, const Status& reason);
@@ -102,6 +116,9 @@ struct StreamServer::Impl {
   std::vector<std::shared_ptr<StreamedSession>>
       ended;  // whose device objects the render thread has to release
   std::deque<std::packaged_task<Status()>> device_work;
+  StreamedSessionStats ended_counters;
+  std::map<absl::StatusCode, uint64_t> refused_clients;
+  transport::LogLimiter refusal_log;
   bool stopping = false, woken = false;
   std::thread io_thread, render_thread;
 };
@@ -112,7 +129,9 @@ Status StreamServer::Impl::open() {
   TESSERA_ASSIGN_OR_RETURN(
       meta, transport::MetaListener::open(io.get_executor(), settings.meta,
                                           [this](const transport::Hello& hello, const std::string& peer) {
-                                            return admit(hello, peer);
+                                            auto admission = admit(hello, peer);
+                                            if (!admission.ok()) refuse(admission.status(), peer);
+                                            return admission;
                                           }));
   io_thread = std::thread([this] { io.run(); });
   render_thread = std::thread([this] { run_renderer(); });
@@ -160,7 +179,8 @@ void StreamServer::Impl::run_renderer() {
   while (const std::shared_ptr<StreamedSession> session = next_ready(lock)) {
     lock.unlock();
     if (const Status status = session->render(); !status.ok()) {
-      spdlog::error("session {}: {}", session->id(), status.ToString());
+      log_event(spdlog::level::err, "session failed",
+                {{"session", session->id()}, {"reason", status.ToString()}});
       (void)end(session->id(), status);
     }
     lock.lock();
@@ -191,7 +211,8 @@ StatusOr<Entry> StreamServer::Impl::find_token(const SessionToken& token) const 
 
 StatusOr<transport::Welcome> StreamServer::Impl::open_media(const Entry& entry) {
   const SessionSettings& s = entry.session->settings();
-  TESSERA_ASSIGN_OR_RETURN(MediaStream stream, make_stream(s, settings.meta.tls != nullptr));
+  const RateSplit rate = entry.session->rate();
+  TESSERA_ASSIGN_OR_RETURN(MediaStream stream, make_stream(rate.bitrate_bps, settings.meta.tls != nullptr));
   const transport::StreamIds ids = stream.sender->ids();
   TESSERA_RETURN_IF_ERROR(media->add_session(entry.session->id(), entry.token, std::move(stream.sender),
                                              media_events(entry.session), stream.srtp));
@@ -200,13 +221,8 @@ StatusOr<transport::Welcome> StreamServer::Impl::open_media(const Entry& entry) 
                             .stream = ids,
                             .atlas_width = static_cast<uint16_t>(s.layout.width),
                             .atlas_height = static_cast<uint16_t>(s.layout.height),
-                            .frames_per_second = static_cast<float>(s.rate.frames_per_second),
+                            .frames_per_second = static_cast<float>(rate.frames_per_second),
                             .srtp = stream.srtp};
-}
-
-void StreamServer::Impl::on_left(StreamedSession& session, const Status& reason) {
-  media->remove_session(session.id(), std::string(reason.message()));
-  session.on_closed(reason);
 }
 
 StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello& hello,
@@ -216,10 +232,11 @@ StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello&
   TESSERA_RETURN_IF_ERROR(session->admit(hello.client));
   StatusOr<transport::Welcome> welcome = open_media(entry);
   if (!welcome.ok()) {
-    on_left(*session, welcome.status());
+    session->on_closed(welcome.status());
     return welcome.status();
   }
-  spdlog::info("session {}: {} connected from {}", session->id(), hello.client.name, peer);
+  log_event(spdlog::level::info, "client connected",
+            {{"session", session->id()}, {"name", hello.client.name}, {"peer", peer}});
   return transport::Admission{
       .welcome = *std::move(welcome),
       .events = {.on_frame =
@@ -229,14 +246,43 @@ StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello&
                        return status;
                      },
                  .on_closed =
-                     [this, session](const Status& reason) {
-                       spdlog::info("session {}: client left: {}", session->id(), reason.ToString());
-                       on_left(*session, reason);
+                     [session](const Status& reason) {
+                       log_event(spdlog::level::info, "client left",
+                                 {{"session", session->id()}, {"reason", reason.ToString()}});
+                       session->on_closed(reason);
                      }},
       .on_connected = [this, session](std::shared_ptr<transport::MetaConnection> connection) {
         session->on_connected(std::move(connection));
         wake();
       }};
+}
+
+// Whoever guesses at tokens must not fill the log.
+void StreamServer::Impl::refuse(const Status& reason, const std::string& peer) {
+  std::optional<uint64_t> count;
+  {
+    const std::lock_guard lock(mutex);
+    ++refused_clients[reason.code()];
+    count = refusal_log.event(clock.now());
+  }
+  if (count) {
+    log_event(spdlog::level::warn, "clients refused",
+              {{"count", *count}, {"last_peer", peer}, {"last_reason", reason.ToString()}});
+  }
+}
+
+Status StreamServer::Impl::check_room(const SessionSettings& wanted) const {
+  if (sessions.size() >= settings.max_sessions) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("all ", settings.max_sessions, " sessions are taken; end one or raise --max-sessions"));
+  }
+  uint64_t taken = 0;
+  for (const auto& [id, entry] : sessions) taken += texels(entry.session->settings());
+  if (taken + texels(wanted) <= settings.max_atlas_texels) return absl::OkStatus();
+  return absl::ResourceExhaustedError(
+      absl::StrCat("the atlases of all sessions have ", taken, " texels and this one would add ",
+                   texels(wanted), " to the ", settings.max_atlas_texels,
+                   " allowed; end a session, take a smaller atlas or raise --max-atlas-mtexels"));
 }
 
 std::shared_ptr<StreamedSession> StreamServer::Impl::take(SessionId id) {
@@ -245,6 +291,7 @@ std::shared_ptr<StreamedSession> StreamServer::Impl::take(SessionId id) {
   if (found == sessions.end()) return nullptr;
   std::shared_ptr<StreamedSession> session = std::move(found->second.session);
   sessions.erase(found);
+  add_counters(ended_counters, session->stats());
   return session;
 }
 
@@ -295,15 +342,40 @@ StatusOr<SessionTicket> StreamServer::create_session(RendererFactory renderer,
   SessionTicket ticket{.media_port = media_port(), .meta_port = meta_port()};
   TESSERA_RETURN_IF_ERROR(fill_random(ticket.token));
   const std::lock_guard lock(s.mutex);
-  if (s.sessions.size() >= s.settings.max_sessions) {
-    return absl::ResourceExhaustedError(absl::StrCat("all ", s.settings.max_sessions,
-                                                     " sessions are taken; end one or raise --max-sessions"));
-  }
+  TESSERA_RETURN_IF_ERROR(s.check_room(settings));
   ticket.session = s.next_id++;
   s.sessions[ticket.session] = {
-      ticket.token,
-      std::make_shared<StreamedSession>(ticket.session, std::move(renderer), settings, s.media, s.clock)};
+      ticket.token, std::make_shared<StreamedSession>(ticket.session, std::move(renderer), settings, s.media,
+                                                      s.clock, s.settings.on_rendered)};
   return ticket;
+}
+
+StatusOr<Forwarding> StreamServer::forward(SessionId session, const transport::PeerAddress& to) {
+  Impl& s = *impl_;
+  transport::SdpSettings sdp{.address = transport::to_string(to), .port = to.port, .retransmission = false};
+  TESSERA_RETURN_IF_ERROR(s.find(session).status());
+  const StatusOr<transport::StreamIds> stream = s.media->stream_ids(session);
+  if (!stream.ok())
+    return absl::FailedPreconditionError(
+        absl::StrCat("session ", session, " has no client yet; connect it first"));
+  sdp.stream = *stream;
+  if (s.settings.meta.tls) {
+    sdp.srtp.emplace();
+    TESSERA_RETURN_IF_ERROR(fill_random(*sdp.srtp));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const std::vector<uint8_t> parameter_sets, s.media->parameter_sets(session));
+  Forwarding forwarding{.session = session};
+  TESSERA_ASSIGN_OR_RETURN(forwarding.sdp, transport::make_sdp(sdp, parameter_sets));
+  TESSERA_ASSIGN_OR_RETURN(forwarding.tap, s.media->add_tap(session, to, sdp.srtp));
+  return forwarding;
+}
+
+void StreamServer::end_forward(const Forwarding& forwarding) {
+  impl_->media->remove_tap(forwarding.session, forwarding.tap);
+}
+
+StatusOr<uint64_t> StreamServer::forwarded_packets(const Forwarding& forwarding) const {
+  return impl_->media->tap_packets(forwarding.session, forwarding.tap);
 }
 
 Status StreamServer::end_session(SessionId session, const std::string& reason) {
@@ -326,9 +398,27 @@ StatusOr<std::shared_ptr<StreamedSession>> StreamServer::Impl::find(SessionId id
   return found->second.session;
 }
 
+Status StreamServer::set_rate(SessionId session, double bitrate_bps, double frames_per_second) {
+  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, impl_->find(session));
+  return found->set_rate(bitrate_bps, frames_per_second);
+}
+
 StatusOr<StreamedSessionStats> StreamServer::stats(SessionId session) const {
   TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, impl_->find(session));
   return found->stats();
+}
+
+StreamServerStats StreamServer::stats() const {
+  const std::lock_guard lock(impl_->mutex);
+  StreamServerStats stats{.ended = impl_->ended_counters,
+                          .refused_clients = impl_->refused_clients,
+                          .binding = impl_->media->binding_stats(),
+                          .dropped_datagrams = impl_->media->dropped_datagrams()};
+  for (const auto& [id, entry] : impl_->sessions) {
+    stats.sessions.emplace(id, entry.session->stats());
+    stats.atlas_texels += texels(entry.session->settings());
+  }
+  return stats;
 }
 
 StatusOr<std::vector<FrameRecord>> StreamServer::records(SessionId session, uint64_t first,

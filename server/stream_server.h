@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,14 +20,35 @@ struct StreamServerSettings {
   transport::UdpSocketSettings media;    // port 0: a free one
   transport::MetaListenerSettings meta;  // likewise
   size_t max_sessions = 32;
+  uint64_t max_atlas_texels = 128u << 20;  // of all sessions together
+  StreamedSession::OnRendered on_rendered;
   bool insecure = false;  // allows other addresses than loopback without TLS
 };
+
+// InvalidArgument: an address beyond loopback without TLS and without `insecure`.
+Status check_exposure(const StreamServerSettings& settings);
 
 // What a client needs to connect. The token is a secret.
 struct SessionTicket {
   transport::SessionId session = 0;
   transport::SessionToken token{};
   uint16_t media_port = 0, meta_port = 0;
+};
+
+// A session's video on its way to a plain RTP player as well.
+struct Forwarding {
+  transport::SessionId session = 0;
+  transport::TapId tap = 0;
+  std::string sdp;  // with TLS it holds the key: as secret as the token
+};
+
+struct StreamServerStats {
+  std::map<transport::SessionId, StreamedSessionStats> sessions;
+  StreamedSessionStats ended;  // the counters of sessions that are no more, summed
+  std::map<absl::StatusCode, uint64_t> refused_clients;
+  transport::BindingStats binding;
+  uint64_t dropped_datagrams = 0;  // the socket's queue was full
+  uint64_t atlas_texels = 0;       // of all sessions
 };
 
 // Thread-safe.
@@ -40,8 +62,17 @@ class StreamServer {
   ~StreamServer();
 
   // The session waits for its client; it renders once both its connections stand. All renderers are of one
-  // device (see renders()). ResourceExhausted: max_sessions.
+  // device (see renders()). ResourceExhausted: max_sessions, max_atlas_texels.
   StatusOr<SessionTicket> create_session(RendererFactory renderer, const SessionSettings& settings);
+  // From the next frame on; the client need not connect again. NotFound.
+  Status set_rate(transport::SessionId session, double bitrate_bps, double frames_per_second);
+  // Sends the session's video to `to` as well, encrypted where the session is. NotFound;
+  // FailedPrecondition: no client, or no frame was sent to it yet; ResourceExhausted: MediaPort::kMaxTaps. It
+  // ends with the client's stream.
+  StatusOr<Forwarding> forward(transport::SessionId session, const transport::PeerAddress& to);
+  void end_forward(const Forwarding& forwarding);
+  // Sent so far. NotFound: the session has ended, or its client left.
+  StatusOr<uint64_t> forwarded_packets(const Forwarding& forwarding) const;
   // NotFound.
   Status end_session(transport::SessionId session, const std::string& reason);
   void end_all(const std::string& reason);
@@ -49,6 +80,7 @@ class StreamServer {
   // See StreamedSession::records().
   StatusOr<std::vector<FrameRecord>> records(transport::SessionId session, uint64_t first,
                                              uint64_t& next) const;
+  StreamServerStats stats() const;
   size_t sessions() const;
 
   // Runs `work` on the render thread, between two frames, and waits for it: a device belongs to one thread.

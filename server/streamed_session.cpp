@@ -12,6 +12,7 @@ constexpr DurationNs kHistoryNs = kNsPerSecond / 2;       // of poses, for predi
 constexpr DurationNs kFirstRoundTripNs = 100 * kNsPerMs;  // assumed before the client has reported one
 constexpr DurationNs kMaxRoundTripNs = kNsPerSecond;
 constexpr size_t kMaxFramesInFlight = 256;
+constexpr DurationNs kRateWindowNs = kNsPerSecond;
 
 // The media port says so when the client has just left, or its address went to another session: no error of
 // the frame.
@@ -23,12 +24,14 @@ bool left(const Status& status) {
 
 StreamedSession::StreamedSession(transport::SessionId id, RendererFactory make_renderer,
                                  const SessionSettings& settings, std::shared_ptr<transport::MediaPort> media,
-                                 const Clock& clock)
+                                 const Clock& clock, OnRendered on_rendered)
     : id_(id),
       media_(std::move(media)),
       clock_(clock),
       settings_(settings),
-      make_renderer_(std::move(make_renderer)) {
+      on_rendered_(std::move(on_rendered)),
+      make_renderer_(std::move(make_renderer)),
+      rate_(settings.rate) {
   stats_.round_trip_ns = kFirstRoundTripNs;
 }
 
@@ -60,7 +63,10 @@ void StreamedSession::on_connected(std::shared_ptr<transport::MetaConnection> co
 }
 
 void StreamedSession::on_closed(const Status& reason) {
+  const auto sent = media_->sender_stats(id_);
+  media_->remove_session(id_, std::string(reason.message()));
   const std::lock_guard lock(mutex_);
+  if (sent) stats_.media += *sent;
   connection_.reset();
   poses_.clear();
   under_way_.clear();
@@ -177,7 +183,8 @@ StreamedSession::Work StreamedSession::take_work() {
           .round_trip_ns = stats_.round_trip_ns,
           .pose_received_ns = newest_pose_received_ns_,
           .due_ns = due_ns_,
-          .key_frame = std::exchange(key_frame_wanted_, false)};
+          .key_frame = std::exchange(key_frame_wanted_, false),
+          .rate = rate_};
 }
 
 // Frames keep their rhythm; one that comes too late begins a new one.
@@ -187,15 +194,43 @@ void StreamedSession::put_off() {
   due_ns_ = std::max(due_ns_ + period_ns(), now);
 }
 
+void StreamedSession::count(const Frame& frame) {
+  const TimeNs now = clock_.now();
+  const std::lock_guard lock(mutex_);
+  stats_.key_frames += frame.atlas.key_frame ? 1 : 0;
+  stats_.meta_bytes += frame.meta.size();
+  stats_.encoder = renderer_->encoder();
+  std::erase_if(sent_, [&](const auto& s) { return s.first <= now - kRateWindowNs; });
+  sent_.emplace_back(now, frame.meta.size() + frame.atlas.bytes.size());
+}
+
+Status StreamedSession::set_rate(double bitrate_bps, double frames_per_second) {
+  {
+    const std::lock_guard lock(mutex_);
+    rate_.bitrate_bps = bitrate_bps;
+    rate_.frames_per_second = frames_per_second;
+  }
+  const Status status = media_->set_rate(id_, bitrate_bps);
+  return left(status) ? absl::OkStatus() : status;  // the next client's stream begins with it
+}
+
+RateSplit StreamedSession::rate() const {
+  const std::lock_guard lock(mutex_);
+  return rate_;
+}
+
 Status StreamedSession::render() {
   const Work work = take_work();
   if (!work.connection || work.poses.empty()) return absl::OkStatus();
   if (!renderer_) {
     SessionSettings settings = settings_;
     settings.client_view = work.client_view;
+    settings.rate = work.rate;
     TESSERA_ASSIGN_OR_RETURN(renderer_, make_renderer_(settings));
   }
-  const StatusOr<double> budget = media_->frame_budget_bits(id_, period_ns(), work.key_frame);
+  renderer_->set_rate(work.rate);
+  const StatusOr<double> budget =
+      media_->frame_budget_bits(id_, from_seconds(1 / work.rate.frames_per_second), work.key_frame);
   if (left(budget.status())) return on_unbound();
   if (!budget.ok()) return budget.status();
   if (*budget <= 0) {  // frames are dropped before they are encoded, never after
@@ -215,6 +250,8 @@ Status StreamedSession::render() {
                                                                  .key_frame = work.key_frame}));
   record.server.render_end = clock_.now();
   put_off();
+  count(frame);
+  if (on_rendered_) on_rendered_(frame.stats);
   return send(work, frame, record);
 }
 
@@ -256,6 +293,10 @@ StreamedSessionStats StreamedSession::stats() const {
   const std::lock_guard lock(mutex_);
   StreamedSessionStats stats = stats_;
   stats.connected = connection_ != nullptr;
+  for (const auto& [when, bytes] : sent_)
+    if (when > clock_.now() - kRateWindowNs) stats.bitrate_bps += 8 * static_cast<double>(bytes);
+  stats.media += media_->sender_stats(id_).value_or(transport::RtpSenderStats{});
+  stats.peer = media_->peer_report(id_);
   return stats;
 }
 

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/frame_record.h"
@@ -19,7 +21,13 @@ namespace tessera::server {
 struct StreamedSessionStats {
   bool connected = false;
   uint64_t frames_sent = 0;
-  uint64_t frames_skipped = 0;   // periods given up: the network still held the frame before
+  uint64_t frames_skipped = 0;                // periods given up: the network still held the frame before
+  uint64_t key_frames = 0;                    // of those sent
+  uint64_t meta_bytes = 0;                    // of geometry sent
+  double bitrate_bps = 0;                     // measured: of the last second's frames, atlas and geometry
+  std::string encoder;                        // which one runs, and why; empty before the first frame
+  transport::RtpSenderStats media;            // of all its clients, one after the other
+  std::optional<transport::PeerReport> peer;  // what the client last reported of the media
   DurationNs round_trip_ns = 0;  // from a pose to the picture that shows its frame, as the client reports it
   Status ended;                  // why the client left, or OK
 };
@@ -31,11 +39,14 @@ class StreamedSession {
   static constexpr size_t kMaxRecords = 1024;
 
   // `settings.client_view` is replaced by what the client's hello says.
+  // `on_rendered` is called by the render thread after each frame, and must not block.
+  using OnRendered = std::function<void(const FrameStats&)>;
   StreamedSession(transport::SessionId id, RendererFactory make_renderer, const SessionSettings& settings,
-                  std::shared_ptr<transport::MediaPort> media, const Clock& clock);
+                  std::shared_ptr<transport::MediaPort> media, const Clock& clock,
+                  OnRendered on_rendered = {});
 
   void on_connected(std::shared_ptr<transport::MetaConnection> connection);
-  void on_closed(const Status& reason);
+  void on_closed(const Status& reason);  // ends the client's media stream, too
   void on_bound();
   void on_pose(const transport::SequencedPose& pose);
   void on_key_frame_request();
@@ -49,6 +60,9 @@ class StreamedSession {
   bool ready() const;
   // When its next frame should start, on the server's clock.
   TimeNs due_ns() const;
+  // From the next frame on.
+  Status set_rate(double bitrate_bps, double frames_per_second);
+  RateSplit rate() const;
   // Renders and sends a frame, or skips it while the network is behind. An error ends the session.
   Status render();
   // Lets go of all that lies on the device; nothing is rendered afterwards.
@@ -57,7 +71,7 @@ class StreamedSession {
   // Of the frames about which the client has reported, the last kMaxRecords; from the `first`-th on, counted
   // from 0 over the session's life. `next` becomes the number to ask for next time.
   std::vector<FrameRecord> records(uint64_t first, uint64_t& next) const;
-  const SessionSettings& settings() const { return settings_; }
+  const SessionSettings& settings() const { return settings_; }  // as created; see rate()
   transport::SessionId id() const { return id_; }
 
  private:
@@ -68,6 +82,7 @@ class StreamedSession {
     DurationNs round_trip_ns = 0;
     TimeNs pose_received_ns = 0, due_ns = 0;
     bool key_frame = false;
+    RateSplit rate;
   };
   Status on_unbound();
   Status on_timing(std::span<const uint8_t> payload);
@@ -75,13 +90,15 @@ class StreamedSession {
   Work take_work();
   Status send(const Work& work, const Frame& frame, FrameRecord record);
   void put_off();
+  void count(const Frame& frame);
   void on_sent(const FrameRecord& record);
-  DurationNs period_ns() const { return from_seconds(1.0 / settings_.rate.frames_per_second); }
+  DurationNs period_ns() const { return from_seconds(1.0 / rate_.frames_per_second); }  // under the lock
 
   const transport::SessionId id_;
   const std::shared_ptr<transport::MediaPort> media_;
   const Clock& clock_;
   const SessionSettings settings_;
+  const OnRendered on_rendered_;
   RendererFactory make_renderer_;            // the render thread's, with all of the device
   std::unique_ptr<FrameRenderer> renderer_;  // likewise
   FrameNumber next_frame_ = 1;               // likewise
@@ -97,6 +114,8 @@ class StreamedSession {
   bool admitted_ = false, bound_ = false, key_frame_wanted_ = false, restart_ = false;
   std::optional<Status> closed_;  // why
   TimeNs due_ns_ = 0;
+  RateSplit rate_;
+  std::deque<std::pair<TimeNs, uint64_t>> sent_;  // when, bytes; of the last second
   StreamedSessionStats stats_;
 };
 

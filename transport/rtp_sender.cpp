@@ -83,6 +83,19 @@ struct RtpSender::Impl {
   RtpSenderStats stats;
 };
 
+RtpSenderStats& RtpSenderStats::operator+=(const RtpSenderStats& other) {
+  frames += other.frames;
+  packets += other.packets;
+  bytes += other.bytes;
+  retransmitted += other.retransmitted;
+  retransmitted_bytes += other.retransmitted_bytes;
+  nacked += other.nacked;
+  not_retransmitted += other.not_retransmitted;
+  key_frame_requests += other.key_frame_requests;
+  malformed_rtcp += other.malformed_rtcp;
+  return *this;
+}
+
 RtpSender::RtpSender(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 RtpSender::~RtpSender() = default;
 

@@ -47,6 +47,8 @@ struct RtpSenderStats {
   uint64_t not_retransmitted = 0;  // of those: too old, on their way already, or no room
   uint64_t key_frame_requests = 0;
   uint64_t malformed_rtcp = 0;
+
+  RtpSenderStats& operator+=(const RtpSenderStats& other);
 };
 
 // What the peer last reported.

@@ -1,14 +1,9 @@
 #include "client-sdk/gles/atlas_texture.h"
 
+#include "client-sdk/gles/shared_shaders.h"
+
 namespace tessera::client::gles {
 namespace {
-
-// Reads: nothing. Writes: one triangle that covers the viewport.
-constexpr const char* kConvertVertex = R"(#version 300 es
-void main() {
-  gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
-}
-)";
 
 // Reads: the three planes. Writes: RGB of the same texel. texelFetch, so that chroma never crosses a block's
 // border.
@@ -42,7 +37,7 @@ void upload_plane(const Texture& texture, const uint8_t* data, uint32_t stride, 
 
 StatusOr<AtlasTexture> AtlasTexture::create() {
   AtlasTexture atlas;
-  TESSERA_ASSIGN_OR_RETURN(atlas.convert_, make_program(kConvertVertex, kConvertFragment));
+  TESSERA_ASSIGN_OR_RETURN(atlas.convert_, make_program(kFullScreenVertex, {kConvertFragment}));
   set_sampler(atlas.convert_, "plane_y", 0);
   set_sampler(atlas.convert_, "plane_u", 1);
   set_sampler(atlas.convert_, "plane_v", 2);

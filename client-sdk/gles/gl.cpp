@@ -1,5 +1,7 @@
 #include "client-sdk/gles/gl.h"
 
+#include <EGL/egl.h>
+
 namespace tessera::client::gles {
 namespace {
 
@@ -10,9 +12,9 @@ HandleType generate() {
   return HandleType(id);
 }
 
-StatusOr<Shader> compile(GLenum stage, const char* source) {
+StatusOr<Shader> compile(GLenum stage, std::initializer_list<const char*> source) {
   Shader shader(glCreateShader(stage));
-  glShaderSource(shader.id(), 1, &source, nullptr);
+  glShaderSource(shader.id(), static_cast<GLsizei>(source.size()), source.begin(), nullptr);
   glCompileShader(shader.id());
   GLint ok = GL_FALSE;
   glGetShaderiv(shader.id(), GL_COMPILE_STATUS, &ok);
@@ -38,8 +40,9 @@ VertexArray make_vertex_array() {
   return generate<VertexArray, glGenVertexArrays>();
 }
 
-StatusOr<Program> make_program(const char* vertex_source, const char* fragment_source) {
-  TESSERA_ASSIGN_OR_RETURN(const Shader vertex, compile(GL_VERTEX_SHADER, vertex_source));
+StatusOr<Program> make_program(const char* vertex_source,
+                               std::initializer_list<const char*> fragment_source) {
+  TESSERA_ASSIGN_OR_RETURN(const Shader vertex, compile(GL_VERTEX_SHADER, {vertex_source}));
   TESSERA_ASSIGN_OR_RETURN(const Shader fragment, compile(GL_FRAGMENT_SHADER, fragment_source));
   Program program(glCreateProgram());
   glAttachShader(program.id(), vertex.id());
@@ -69,6 +72,21 @@ void bind_texture(GLuint unit, const Texture& texture) {
 void set_sampler(const Program& program, const char* name, GLint unit) {
   glUseProgram(program.id());
   glUniform1i(glGetUniformLocation(program.id(), name), unit);
+}
+
+bool has_extension(std::string_view name) {
+  GLint count = 0;
+  glGetIntegerv(GL_NUM_EXTENSIONS, &count);
+  for (GLint i = 0; i < count; ++i) {
+    const GLubyte* extension = glGetStringi(GL_EXTENSIONS, static_cast<GLuint>(i));
+    if (extension != nullptr && name == reinterpret_cast<const char*>(extension)) return true;
+  }
+  return false;
+}
+
+ClipControl find_clip_control() {
+  if (!has_extension("GL_EXT_clip_control")) return nullptr;
+  return reinterpret_cast<ClipControl>(eglGetProcAddress("glClipControlEXT"));
 }
 
 Status check_errors(const char* what) {

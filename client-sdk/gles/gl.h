@@ -3,8 +3,12 @@
 #pragma once
 
 #include <GLES3/gl3.h>
+// After it:
+#include <GLES2/gl2ext.h>
 
+#include <initializer_list>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "base/status.h"
@@ -61,13 +65,19 @@ Texture make_texture();
 Renderbuffer make_renderbuffer();
 Framebuffer make_framebuffer();
 VertexArray make_vertex_array();
-StatusOr<Program> make_program(const char* vertex_source, const char* fragment_source);
+// The fragment shader's source may come in parts.
+StatusOr<Program> make_program(const char* vertex_source, std::initializer_list<const char*> fragment_source);
 
 // Filter GL_NEAREST or GL_LINEAR, no mip levels, clamped to the edge; the texture stays bound to
 // GL_TEXTURE_2D.
 void set_sampling(const Texture& texture, GLint filter);
 void bind_texture(GLuint unit, const Texture& texture);
 void set_sampler(const Program& program, const char* name, GLint unit);
+
+bool has_extension(std::string_view name);
+// EXT_clip_control's entry, which lets depth run from 0 to 1; null where the driver does not have it.
+using ClipControl = PFNGLCLIPCONTROLEXTPROC;
+ClipControl find_clip_control();
 
 // The first error since the last call, if any; `what` names the step that failed.
 Status check_errors(const char* what);

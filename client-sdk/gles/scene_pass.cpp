@@ -1,36 +1,15 @@
 #include "client-sdk/gles/scene_pass.h"
 
-#include <EGL/egl.h>
-#include <GLES2/gl2ext.h>
-
 #include <glm/gtc/type_ptr.hpp>
 #include <span>
-#include <string_view>
 
 #include "client-sdk/gles/scene_shaders.h"
+#include "client-sdk/gles/shared_shaders.h"
 
 namespace tessera::client::gles {
 namespace {
 
 enum Unit : GLuint { kRecords, kVertices, kTransforms, kAtlas };
-
-bool has_extension(std::string_view name) {
-  GLint count = 0;
-  glGetIntegerv(GL_NUM_EXTENSIONS, &count);
-  for (GLint i = 0; i < count; ++i) {
-    const GLubyte* extension = glGetStringi(GL_EXTENSIONS, static_cast<GLuint>(i));
-    if (extension != nullptr && name == reinterpret_cast<const char*>(extension)) return true;
-  }
-  return false;
-}
-
-bool enable_depth_from_zero_to_one() {
-  if (!has_extension("GL_EXT_clip_control")) return false;
-  const auto clip_control = reinterpret_cast<PFNGLCLIPCONTROLEXTPROC>(eglGetProcAddress("glClipControlEXT"));
-  if (clip_control == nullptr) return false;
-  clip_control(GL_LOWER_LEFT_EXT, GL_ZERO_TO_ONE_EXT);
-  return true;
-}
 
 template <typename T>
 std::span<const std::byte> bytes_of(const std::vector<T>& values) {
@@ -39,20 +18,20 @@ std::span<const std::byte> bytes_of(const std::vector<T>& values) {
 
 }  // namespace
 
-StatusOr<ScenePass> ScenePass::create(bool multisampled) {
+StatusOr<ScenePass> ScenePass::create(ClipControl clip_control) {
   ScenePass pass;
-  pass.multisampled_ = multisampled;
-  pass.reversed_depth_ = enable_depth_from_zero_to_one();
-  TESSERA_ASSIGN_OR_RETURN(pass.program_, make_program(kSceneVertex, kSceneFragment));
+  pass.clip_control_ = clip_control;
+  TESSERA_ASSIGN_OR_RETURN(pass.program_, make_program(kSceneVertex, {kPicturePrelude, kSceneFragment}));
   set_sampler(pass.program_, "records", kRecords);
   set_sampler(pass.program_, "vertices", kVertices);
   set_sampler(pass.program_, "transforms", kTransforms);
   set_sampler(pass.program_, "atlas", kAtlas);
   const GLuint program = pass.program_.id();
-  glUniform1i(glGetUniformLocation(program, "multisampled"), multisampled ? 1 : 0);
   pass.clip_from_relative_ = glGetUniformLocation(program, "clip_from_relative");
   pass.atlas_size_ = glGetUniformLocation(program, "atlas_size");
   pass.masked_ = glGetUniformLocation(program, "masked");
+  pass.multisampled_ = glGetUniformLocation(program, "multisampled");
+  pass.srgb_target_ = glGetUniformLocation(program, "srgb_target");
   pass.no_attributes_ = make_vertex_array();
   TESSERA_RETURN_IF_ERROR(check_errors("creation of the scene pass"));
   return pass;
@@ -85,18 +64,18 @@ Status ScenePass::upload_transforms(const dvec3& eye) {
 
 mat4 ScenePass::clip_from_relative(const View& view) const {
   mat4 clip = view_projection(view, view.pose.position);
-  if (!reversed_depth_) {
+  if (clip_control_ == nullptr) {
     // Depth d of 1 (near) to 0 becomes 1 - 2d: -1 (near) to 1, OpenGL's default range.
     for (int column = 0; column < 4; ++column) clip[column].z = clip[column].w - 2 * clip[column].z;
   }
   return clip;
 }
 
-Status ScenePass::draw(const View& view, const AtlasTexture& atlas) {
+Status ScenePass::draw(const View& view, const AtlasTexture& atlas, const TargetKind& target) {
   glEnable(GL_DEPTH_TEST);
   glDepthMask(GL_TRUE);
-  glDepthFunc(reversed_depth_ ? GL_GREATER : GL_LESS);
-  glClearDepthf(reversed_depth_ ? 0.0f : 1.0f);
+  glDepthFunc(clip_control_ != nullptr ? GL_GREATER : GL_LESS);
+  glClearDepthf(clip_control_ != nullptr ? 0.0f : 1.0f);
   glClear(GL_DEPTH_BUFFER_BIT);
   if (atlas_width_ == 0) return check_errors("clearing of the picture");
   if (atlas.width() != atlas_width_ || atlas.height() != atlas_height_) {
@@ -109,23 +88,28 @@ Status ScenePass::draw(const View& view, const AtlasTexture& atlas) {
   glUseProgram(program_.id());
   glUniformMatrix4fv(clip_from_relative_, 1, GL_FALSE, glm::value_ptr(clip_from_relative(view)));
   glUniform2f(atlas_size_, static_cast<float>(atlas.width()), static_cast<float>(atlas.height()));
+  glUniform1i(multisampled_, target.multisampled ? 1 : 0);
+  glUniform1i(srgb_target_, target.srgb ? 1 : 0);
   vertices_.bind(kVertices);
   transforms_.bind(kTransforms);
   atlas.bind(kAtlas);
   glBindVertexArray(no_attributes_.id());
-  for (int group = 0; group < kRecordGroups; ++group) draw_group(static_cast<RecordGroup>(group));
+  if (clip_control_ != nullptr) clip_control_(GL_LOWER_LEFT_EXT, GL_ZERO_TO_ONE_EXT);
+  for (int group = 0; group < kRecordGroups; ++group)
+    draw_group(static_cast<RecordGroup>(group), target.multisampled);
+  if (clip_control_ != nullptr) clip_control_(GL_LOWER_LEFT_EXT, GL_NEGATIVE_ONE_TO_ONE_EXT);
   glDisable(GL_SAMPLE_ALPHA_TO_COVERAGE);
   return check_errors("drawing of the scene");
 }
 
-void ScenePass::draw_group(RecordGroup group) {
+void ScenePass::draw_group(RecordGroup group, bool multisampled) {
   const int index = static_cast<int>(group);
   if (record_counts_[index] == 0) return;
   const bool masked = group == RecordGroup::masked_single_sided || group == RecordGroup::masked_double_sided;
   const bool double_sided = group == RecordGroup::double_sided || group == RecordGroup::masked_double_sided;
   const auto set = [](GLenum state, bool on) { on ? glEnable(state) : glDisable(state); };
   set(GL_CULL_FACE, !double_sided);
-  set(GL_SAMPLE_ALPHA_TO_COVERAGE, masked && multisampled_);
+  set(GL_SAMPLE_ALPHA_TO_COVERAGE, masked && multisampled);
   glUniform1i(masked_, masked ? 1 : 0);
   records_[index].bind(kRecords);
   glDrawArrays(GL_TRIANGLES, 0, 3 * record_counts_[index]);

@@ -11,15 +11,23 @@
 
 namespace tessera::client::gles {
 
+// What a framebuffer does with what is drawn into it.
+struct TargetKind {
+  bool multisampled = false;  // several samples a pixel, so that alpha can become coverage
+  bool srgb = false;          // encodes colours itself, so that it must be given linear ones
+};
+
 class ScenePass {
  public:
-  // `multisampled`: the target has several samples a pixel, so that alpha can become coverage.
-  static StatusOr<ScenePass> create(bool multisampled);
+  // With `clip_control` depth is reversed straight from 0 to 1; without, the range -1 to 1 costs its
+  // precision.
+  static StatusOr<ScenePass> create(ClipControl clip_control);
 
   // Keeps a copy of the state on the device; uploads what changed.
   Status set_state(const SceneState& state);
-  // Into the bound framebuffer, whose colour the caller has cleared; clears depth.
-  Status draw(const View& view, const AtlasTexture& atlas);
+  // Into the bound framebuffer, whose colour the caller has cleared; clears depth. Other state is as
+  // StateScope leaves it.
+  Status draw(const View& view, const AtlasTexture& atlas, const TargetKind& target);
 
  private:
   static TableTexture record_table() {
@@ -29,13 +37,12 @@ class ScenePass {
   ScenePass() = default;
   Status upload_transforms(const dvec3& eye);
   mat4 clip_from_relative(const View& view) const;
-  void draw_group(RecordGroup group);
+  void draw_group(RecordGroup group, bool multisampled);
 
-  bool multisampled_ = false;
-  // Reversed depth straight from 0 to 1 (EXT_clip_control); otherwise the range -1 to 1 costs its precision.
-  bool reversed_depth_ = false;
+  ClipControl clip_control_ = nullptr;
   Program program_;
-  GLint clip_from_relative_ = -1, atlas_size_ = -1, masked_ = -1;  // uniform locations
+  // Uniform locations.
+  GLint clip_from_relative_ = -1, atlas_size_ = -1, masked_ = -1, multisampled_ = -1, srgb_target_ = -1;
   VertexArray no_attributes_;
 
   uint32_t atlas_width_ = 0, atlas_height_ = 0;  // of the state; 0 before the first

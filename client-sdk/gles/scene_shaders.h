@@ -69,9 +69,8 @@ void main() {
 }
 )";
 
-// Reads: the atlas. Writes: colour, and alpha that multisampling turns into coverage.
-constexpr const char* kSceneFragment = R"(#version 300 es
-precision highp float;
+// After kPicturePrelude. Reads: the atlas. Writes: colour, and alpha that multisampling turns into coverage.
+constexpr const char* kSceneFragment = R"(
 uniform highp sampler2D atlas;
 uniform vec2 atlas_size;
 uniform bool masked;
@@ -89,7 +88,7 @@ void main() {
   // At a pixel whose centre lies outside the triangle interpolation may leave the block. Not `centroid`: thin triangles
   // share most of their pixels, and each would be sampled elsewhere than where the pixel shows it.
   vec2 inside = clamp(texel, texel_bounds.xy, texel_bounds.zw);
-  color = vec4(single_color.a > 0.5 ? single_color.rgb : atlas_at(inside), 1.0);
+  color = vec4(for_target(single_color.a > 0.5 ? single_color.rgb : atlas_at(inside)), 1.0);
   if (!masked) return;
   // Coverage travels as grey, 0.5 = the material's cut-off. Its luma is free of chroma's rounding.
   float coverage = dot(atlas_at(inside + coverage_offset), vec3(0.2126, 0.7152, 0.0722));

@@ -1,77 +1,53 @@
 // tessera-client: a viewer without a window. Follows a path, draws the newest pair at the newest pose, writes
 // pictures.
-#define STB_IMAGE_WRITE_IMPLEMENTATION
-#include <grpcpp/grpcpp.h>
-#include <stb_image_write.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "base/camera_path.h"
+#include "base/frame_trace.h"
 #include "base/log.h"
 #include "client-sdk/connection.h"
 #include "client-sdk/display.h"
+#include "client-sdk/ticket.h"
+#include "client-sdk/tools/controlled_session.h"
+#include "client-sdk/tools/picture_writer.h"
 #include "codec/yuv.h"
-#include "tessera/v1/control.grpc.pb.h"
 
 namespace {
 
 using namespace tessera;
+
+constexpr DurationNs kConnectTimeoutNs = 8 * kNsPerSecond;
 
 enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
 constexpr char kFooter[] = R"(Examples:
   tessera-client --scene hall --seconds 5 --out pictures
   tessera-client --control 127.0.0.1:7310 --scene sponza --path sponza_1.csv --width 1280 --height 720 --save-every 10 --json run.json
+  tessera-client --scene hall --out hall.mp4 --trace hall-trace.json
+  tessera-client --control render.example:7310 --ca ca.pem --scene hall --print-ticket
+  tessera-client --ticket tessera://127.0.0.1:7311/TOKEN --out pictures
 
 Exit codes: 0 done, 1 the stream failed, 2 wrong usage.)";
 
 struct Settings {
-  std::string control = "127.0.0.1:7310", scene, path, out, json;
+  client::ControlSettings control;
+  std::string scene, ticket, path, out, json, frames_csv, trace;
+  bool print_ticket = false;
   std::vector<double> position{0, 1.6, 0};
   double seconds = 5, fps = 60, fov_y_deg = 60;
   uint32_t width = 960, height = 540, save_every = 30;
 };
 
 struct Totals {
-  uint64_t displayed = 0, fresh = 0, pictures = 0;
-};
-
-Status to_status(const grpc::Status& status) {
-  return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
-}
-
-// A session of its own, ended with the program.
-class ControlledSession {
- public:
-  static StatusOr<std::unique_ptr<ControlledSession>> create(const Settings& s) {
-    std::unique_ptr<ControlledSession> session(new ControlledSession);
-    session->stub_ = v1::Control::NewStub(grpc::CreateChannel(s.control, grpc::InsecureChannelCredentials()));
-    grpc::ClientContext context;
-    v1::CreateSessionRequest request;
-    request.set_scene(s.scene);
-    const Status created = to_status(session->stub_->CreateSession(&context, request, &session->ticket_));
-    if (created.ok()) return session;
-    return absl::Status(created.code(), absl::StrCat("control at ", s.control, ": ", created.message()));
-  }
-  ~ControlledSession() {
-    if (ticket_.session() == 0) return;
-    grpc::ClientContext context;
-    v1::DeleteSessionRequest request;
-    request.set_session(ticket_.session());
-    v1::DeleteSessionResponse response;
-    stub_->DeleteSession(&context, request, &response);
-  }
-  const v1::Ticket& ticket() const { return ticket_; }
-
- private:
-  ControlledSession() = default;
-  std::unique_ptr<v1::Control::Stub> stub_;
-  v1::Ticket ticket_;
+  uint64_t displayed = 0, fresh = 0;
+  nlohmann::json saved = nlohmann::json::array();  // what each picture shows
 };
 
 View view_of(const Settings& s) {
@@ -83,20 +59,12 @@ View view_of(const Settings& s) {
   return view;
 }
 
-StatusOr<std::unique_ptr<client::Connection>> connect(const Settings& s, const v1::Ticket& ticket,
-                                                      const Clock& clock) {
-  client::ConnectionSettings settings;
-  settings.server_address = s.control.substr(0, s.control.rfind(':'));
-  settings.meta_port = static_cast<uint16_t>(ticket.meta_port());
-  if (ticket.token().size() != settings.token.size())
-    return absl::InternalError("the ticket's token has a wrong size");
-  std::copy(ticket.token().begin(), ticket.token().end(), settings.token.begin());
-  settings.client = {.width = static_cast<uint16_t>(s.width),
-                     .height = static_cast<uint16_t>(s.height),
-                     .fov = view_of(s).fov,
-                     .display_hz = static_cast<float>(s.fps),
-                     .name = "tessera-client"};
-  return client::Connection::connect(settings, clock);
+transport::ClientSettings client_settings(const Settings& s) {
+  return {.width = static_cast<uint16_t>(s.width),
+          .height = static_cast<uint16_t>(s.height),
+          .fov = view_of(s).fov,
+          .display_hz = static_cast<float>(s.fps),
+          .name = "tessera-client"};
 }
 
 // Stands on the path, or at --position and looks around once in ten seconds.
@@ -122,22 +90,16 @@ class Head {
   Pose still_;
 };
 
-Status save(const Settings& s, const Image8& image, uint64_t index) {
-  const std::string file = absl::StrFormat("%s/%06d.png", s.out, index);
-  if (stbi_write_png(file.c_str(), static_cast<int>(image.width), static_cast<int>(image.height), 4,
-                     image.rgba.data(), static_cast<int>(4 * image.width)))
-    return absl::OkStatus();
-  return absl::UnavailableError(absl::StrCat("cannot write ", file));
-}
-
 class Viewer {
  public:
+  // `writer` may be null.
   Viewer(const Settings& s, Head head, client::Connection& connection, client::Display& display,
-         const Clock& clock)
+         client::PictureWriter* writer, const Clock& clock)
       : s_(s),
         head_(std::move(head)),
         connection_(connection),
         display_(display),
+        writer_(writer),
         clock_(clock),
         view_(view_of(s)) {}
 
@@ -171,15 +133,26 @@ class Viewer {
     }
     if (!pair_) return absl::OkStatus();
     TESSERA_ASSIGN_OR_RETURN(const Image8 image, display_.draw(view_));
+    const TimeNs displayed = clock_.now();
     if (next) {
-      connection_.report_displayed(next->frame, clock_.now());
+      connection_.report_displayed(next->frame, displayed);
       ++totals_.fresh;
     }
-    if (!s_.out.empty() && totals_.displayed % s_.save_every == 0) {
-      TESSERA_RETURN_IF_ERROR(save(s_, image, totals_.displayed));
-      ++totals_.pictures;
-    }
+    if (writer_) TESSERA_RETURN_IF_ERROR(save(image, displayed));
     ++totals_.displayed;
+    return absl::OkStatus();
+  }
+
+  Status save(const Image8& image, TimeNs displayed) {
+    TESSERA_ASSIGN_OR_RETURN(const std::string file, writer_->write(image, totals_.displayed));
+    if (file.empty()) return absl::OkStatus();
+    const auto& [position, q] = view_.pose;
+    totals_.saved.push_back({{"file", file},
+                             {"index", totals_.displayed},
+                             {"frame", pair_->frame},
+                             {"displayed_ns", displayed},
+                             {"position", {position.x, position.y, position.z}},
+                             {"orientation_xyzw", {q.x, q.y, q.z, q.w}}});
     return absl::OkStatus();
   }
 
@@ -187,36 +160,79 @@ class Viewer {
   Head head_;
   client::Connection& connection_;
   client::Display& display_;
+  client::PictureWriter* writer_;
   const Clock& clock_;
   View view_;
   const client::Pair* pair_ = nullptr;
   Totals totals_;
 };
 
+Status print_ticket(const Settings& s) {
+  TESSERA_ASSIGN_OR_RETURN(const auto session, client::ControlledSession::create(s.control, s.scene));
+  session->keep();
+  std::cout << client::to_string(session->ticket()) << std::endl;
+  return absl::OkStatus();
+}
+
+Status write_frames(const Settings& s, const std::vector<FrameRecord>& records) {
+  using Write = void (*)(std::span<const FrameRecord>, std::ostream&);
+  for (const auto& [file, write] :
+       {std::pair<std::string, Write>(s.frames_csv, write_csv), {s.trace, write_chrome_trace}}) {
+    if (file.empty()) continue;
+    std::ofstream out(file);
+    write(records, out);
+    if (!out.flush()) return absl::UnavailableError(absl::StrCat("cannot write ", file));
+  }
+  return absl::OkStatus();
+}
+
 StatusOr<nlohmann::json> view(const Settings& s) {
   const SteadyClock clock;
   TESSERA_ASSIGN_OR_RETURN(Head head, Head::create(s));
+  std::unique_ptr<client::PictureWriter> writer;
   if (!s.out.empty()) {
-    std::error_code error;
-    std::filesystem::create_directories(s.out, error);
-    if (error) return absl::UnavailableError(absl::StrCat("cannot make ", s.out, ": ", error.message()));
+    TESSERA_ASSIGN_OR_RETURN(
+        writer, client::make_picture_writer({.out = s.out, .save_every = s.save_every, .fps = s.fps}));
   }
-  TESSERA_ASSIGN_OR_RETURN(const auto session, ControlledSession::create(s));
-  TESSERA_ASSIGN_OR_RETURN(const auto connection, connect(s, session->ticket(), clock));
+  std::unique_ptr<client::ControlledSession> session;  // of this program's own, for its lifetime
+  client::Ticket ticket;
+  if (!s.ticket.empty()) {
+    TESSERA_ASSIGN_OR_RETURN(ticket, client::parse_ticket(s.ticket));
+  } else {
+    TESSERA_ASSIGN_OR_RETURN(session, client::ControlledSession::create(s.control, s.scene));
+    ticket = session->ticket();
+    if (!s.frames_csv.empty() || !s.trace.empty()) session->record_frames();
+  }
+  TESSERA_ASSIGN_OR_RETURN(const auto connection,
+                           client::connect(ticket, client_settings(s), kConnectTimeoutNs, clock));
   TESSERA_ASSIGN_OR_RETURN(const auto display,
                            client::Display::create({.width = s.width, .height = s.height}));
-  Viewer viewer(s, std::move(head), *connection, *display, clock);
+  Viewer viewer(s, std::move(head), *connection, *display, writer.get(), clock);
   TESSERA_RETURN_IF_ERROR(viewer.run());
+  if (writer) TESSERA_RETURN_IF_ERROR(writer->finish());
+  if (session) TESSERA_RETURN_IF_ERROR(write_frames(s, session->frames()));
   const client::ConnectionStats stats = connection->stats();
   const Totals& totals = viewer.totals();
   return nlohmann::json{{"frames_displayed", totals.displayed},
                         {"frames_fresh", totals.fresh},
-                        {"pictures", totals.pictures},
+                        {"pictures", writer ? writer->written() : 0},
+                        {"saved", totals.saved},
                         {"network_round_trip_ms", to_ms(stats.round_trip_ns.value_or(0))},
                         {"packets", stats.media.packets},
                         {"packets_recovered", stats.media.recovered},
                         {"packets_given_up", stats.media.given_up},
                         {"decode_errors", stats.core.decode_errors}};
+}
+
+Status run(const Settings& s) {
+  if (s.print_ticket) return print_ticket(s);
+  TESSERA_ASSIGN_OR_RETURN(const nlohmann::json result, view(s));
+  if (s.json.empty() || s.json == "-") {
+    std::cout << result.dump(1) << std::endl;
+    return absl::OkStatus();
+  }
+  if (std::ofstream(s.json) << result.dump(1) << std::endl) return absl::OkStatus();
+  return absl::UnavailableError(absl::StrCat("cannot write ", s.json));
 }
 
 }  // namespace
@@ -226,9 +242,19 @@ int main(int argc, char** argv) {
   app.footer(kFooter);
   Settings s;
   std::string log_level = "warn";
-  app.add_option("--control", s.control, "address:port of the daemon's gRPC, in numbers")
-      ->capture_default_str();
-  app.add_option("--scene", s.scene, "a scene that the daemon holds")->required();
+  app.add_option("--control", s.control.endpoint, "host:port of the daemon's gRPC")->capture_default_str();
+  CLI::Option* authority = app.add_option(
+      "--ca", s.control.authority_file,
+      "TLS: who signed the server's certificate (PEM; '': whom the system trusts), for control and session");
+  CLI::Option* scene =
+      app.add_option("--scene", s.scene, "view a scene that the daemon holds, in a new session");
+  app.add_option("--ticket", s.ticket, "view the session of this ticket: tessera://HOST:PORT/TOKEN[?ca=FILE]")
+      ->envname("TESSERA_TICKET")
+      ->excludes(scene)
+      ->excludes(authority);
+  app.add_flag("--print-ticket", s.print_ticket,
+               "print the new session's ticket, a secret, and leave it to an app")
+      ->needs(scene);
   app.add_option("--path", s.path, "camera path (CSV); none: look around at --position")
       ->check(CLI::ExistingFile);
   app.add_option("--position", s.position, "x y z in metres")->expected(3)->capture_default_str();
@@ -239,27 +265,32 @@ int main(int argc, char** argv) {
   app.add_option("--width", s.width, "pixels")->check(CLI::Range(2, 8192))->capture_default_str();
   app.add_option("--height", s.height, "pixels")->check(CLI::Range(2, 8192))->capture_default_str();
   app.add_option("--fov-y", s.fov_y_deg, "degrees")->check(CLI::Range(1.0, 179.0))->capture_default_str();
-  app.add_option("--out", s.out, "folder for pictures (PNG); none: write none");
-  app.add_option("--save-every", s.save_every, "n-th displayed frame")
+  app.add_option("--out", s.out,
+                 "folder for pictures (PNG), or a .mp4 file of all (by ffmpeg); none: write none");
+  app.add_option("--save-every", s.save_every, "n-th displayed frame becomes a PNG")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
   app.add_option("--json", s.json, "write what was measured to this file; - for standard output");
+  app.add_option("--frames-csv", s.frames_csv,
+                 "with --scene: a line for every frame, with the times of both ends")
+      ->needs(scene);
+  app.add_option("--trace", s.trace,
+                 "with --scene: the same as a trace for Perfetto or chrome://tracing (JSON)")
+      ->needs(scene);
   app.add_option("--log", log_level, "level on standard error")->capture_default_str();
   try {
     app.parse(argc, argv);
+    if (s.scene.empty() && s.ticket.empty()) throw CLI::RequiredError("--scene or --ticket");
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kOk : kUsage;
   }
   init_logging(log_level);
-  const StatusOr<nlohmann::json> result = view(s);
-  if (!result.ok()) {
-    std::cerr << "tessera-client: " << result.status().message() << std::endl;
+  std::signal(SIGPIPE, SIG_IGN);  // an ffmpeg that ends is an error of its picture
+  if (s.control.authority_file && !s.control.authority_file->empty())  // a printed ticket is read elsewhere
+    s.control.authority_file = std::filesystem::absolute(*s.control.authority_file);
+  if (const Status status = run(s); !status.ok()) {
+    std::cerr << "tessera-client: " << status.message() << std::endl;
     return kFailed;
-  }
-  if (!s.json.empty() && s.json != "-") {
-    std::ofstream(s.json) << result->dump(1) << "\n";
-  } else {
-    std::cout << result->dump(1) << std::endl;
   }
   return kOk;
 }

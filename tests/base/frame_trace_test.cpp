@@ -11,13 +11,27 @@ namespace {
 FrameRecord shown() {
   FrameRecord r{.session = 3, .frame = 8, .key_frame = true, .atlas_bytes = 100, .meta_bytes = 20};
   r.pose_sent = 1'000'000;
-  r.server = {.pose_received = 52'000'000, .due = 53'000'000, .render_begin = 53'000'000,
-              .render_end = 63'000'000, .sent = 63'000'000, .visibility = 4'000'000, .layout = 1'000'000,
-              .shading = 3'000'000, .encode = 2'000'000};
-  r.client = {.frame = 8, .atlas_first_packet = 14'000'000, .atlas_complete = 15'000'000,
-              .atlas_decode_begin = 15'000'000, .atlas_decoded = 18'000'000, .meta_complete = 14'000'000,
-              .meta_decode_begin = 14'000'000, .meta_decoded = 14'500'000, .draw_begin = 20'000'000,
-              .displayed = 24'000'000, .clock_offset = 50'000'000, .clock_error = 100'000};
+  r.server = {.pose_received = 52'000'000,
+              .due = 53'000'000,
+              .render_begin = 53'000'000,
+              .render_end = 63'000'000,
+              .sent = 63'000'000,
+              .visibility = 4'000'000,
+              .layout = 1'000'000,
+              .shading = 3'000'000,
+              .encode = 2'000'000};
+  r.client = {.frame = 8,
+              .atlas_first_packet = 14'000'000,
+              .atlas_complete = 15'000'000,
+              .atlas_decode_begin = 15'000'000,
+              .atlas_decoded = 18'000'000,
+              .meta_complete = 14'000'000,
+              .meta_decode_begin = 14'000'000,
+              .meta_decoded = 14'500'000,
+              .draw_begin = 20'000'000,
+              .displayed = 24'000'000,
+              .clock_offset = 50'000'000,
+              .clock_error = 100'000};
   return r;
 }
 FrameRecord lost() {
@@ -80,7 +94,8 @@ TEST(FrameTrace, SpansLieOnOneClock) {
     used.insert(event["tid"].get<int>());
     drawn += event["name"] == "draw";
     if (event["args"]["frame"] == 8)
-      spans[{event["tid"], event["name"]}] = {event["ts"], event["ts"].get<double>() + event["dur"].get<double>()};
+      spans[{event["tid"], event["name"]}] = {event["ts"],
+                                              event["ts"].get<double>() + event["dur"].get<double>()};
   }
   EXPECT_TRUE(std::ranges::includes(named, used));
   EXPECT_EQ(drawn, 1) << "the lost frame was not drawn";

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -33,6 +36,50 @@ TEST(Log, AnUnknownLevelMeansInfo) {
 TEST(Log, OffMeansOff) {
   init_logging("off");
   EXPECT_EQ(logged([] { spdlog::critical("shown"); }), "");
+}
+
+TEST(Log, AnEventIsOneLineOfKeysAndValues) {
+  init_logging("info");
+  const auto log = [] {
+    log_event(spdlog::level::info, "client left",
+              {{"session", 3}, {"peer", "::1"}, {"name", "a b=\"c\"\n2026 error"}, {"empty", ""}});
+  };
+  EXPECT_TRUE(
+      logged(log).ends_with(R"(info client left session=3 peer=::1 name="a b=\"c\"\n2026 error" empty="")"
+                            "\n"));
+  init_logging("info", LogFormat::json);
+  const std::string line = logged(log);
+  const auto json = nlohmann::json::parse(line);
+  EXPECT_EQ(json["level"], "info");
+  EXPECT_EQ(json["event"], "client left");
+  EXPECT_EQ(json["session"], 3);
+  EXPECT_EQ(json["name"], "a b=\"c\"\n2026 error");
+}
+
+// A peer's text neither breaks a line nor forges one, whatever it is.
+TEST(Log, HostileTextStaysInItsField) {
+  for (const LogFormat format : {LogFormat::text, LogFormat::json}) {
+    init_logging("info", format);
+    std::string hostile =
+        "\xff\x1e"
+        "session\x1f"
+        "9";
+    for (char c = 1; c < 0x20; ++c) hostile += c;
+    const std::string text = logged([&] {
+      log_event(spdlog::level::info, "event", {{"name", hostile}, {"load", std::nan("")}});
+      spdlog::info("plain\nerror forged");
+    });
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 2) << text;
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\x1b'), 0) << text;
+    if (format == LogFormat::text) continue;
+    std::istringstream in(text);
+    for (std::string line; std::getline(in, line);) {
+      const auto json = nlohmann::json::parse(line, nullptr, false);
+      EXPECT_FALSE(json.is_discarded()) << line;
+      EXPECT_FALSE(json.contains("session")) << line;
+    }
+  }
+  init_logging("info");
 }
 
 TEST(Log, LinesOfSeveralThreadsAreWholeAndInEachThreadsOrder) {

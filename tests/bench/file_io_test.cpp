@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "temporary_folder.h"
+#include "bench/temporary_folder.h"
 
 namespace tessera::bench {
 namespace {

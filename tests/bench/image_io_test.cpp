@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "temporary_folder.h"
+#include "bench/temporary_folder.h"
 #include "test_images.h"
 
 namespace tessera::bench {

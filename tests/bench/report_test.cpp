@@ -9,8 +9,8 @@
 #include "bench/file_io.h"
 #include "bench/image_io.h"
 #include "bench/report_plots.h"
+#include "bench/temporary_folder.h"
 #include "sample_result.h"
-#include "temporary_folder.h"
 
 namespace tessera::bench {
 namespace {

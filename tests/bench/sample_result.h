@@ -42,9 +42,9 @@ inline LoopbackResult sample_result() {
       {.method = "plain-video", .error = {.mssim = 0.6}, .server_ms = 20}};
   result.split = {{"sampling", 0.98, 35, 0.02}, {"coding", 0.97, 34, 0.01}};
   for (int i = 0; i < 60; ++i) {
-    FrameRecord frame{.time_ns = i * kNsPerSecond / 60,
-                      .frame = static_cast<uint32_t>(i / 2),
-                      .age_ms = 100.0 + i % 2 * 16};
+    DisplayRecord frame{.time_ns = i * kNsPerSecond / 60,
+                        .frame = static_cast<uint32_t>(i / 2),
+                        .age_ms = 100.0 + i % 2 * 16};
     frame.atlas_bytes = i % 2 ? 0 : 70000;
     frame.meta_bytes = i % 2 ? 0 : 5000;
     frame.mssim = {{"tessera", 0.96 + 0.01 * std::sin(i)}, {"mesh-warp", 0.9}, {"plain-video", 0.6}};

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "bench/file_io.h"
+#include "bench/temporary_folder.h"
 #include "bench/truth_entry.h"
-#include "temporary_folder.h"
 #include "test_images.h"
 
 namespace tessera::bench {

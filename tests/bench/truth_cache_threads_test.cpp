@@ -5,8 +5,8 @@
 #include <thread>
 #include <vector>
 
+#include "bench/temporary_folder.h"
 #include "bench/truth_cache.h"
-#include "temporary_folder.h"
 #include "test_images.h"
 
 namespace tessera::bench {

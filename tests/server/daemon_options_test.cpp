@@ -12,10 +12,10 @@ namespace {
 struct Options {
   CLI::App app{"test"};
   DaemonSettings settings;
-  std::string log_level = "info";
+  LogSettings log;
   Options() {
     app.set_config("--config");
-    add_options(app, settings, log_level);
+    add_options(app, settings, log);
   }
 };
 
@@ -30,7 +30,7 @@ void expect_round_trip(const std::vector<std::string>& flags) {
   std::vector<std::string> from_file{file.string(), "--config"};
   ASSERT_NO_THROW(second.app.parse(from_file)) << testing::PrintToString(flags);
   EXPECT_EQ(first.settings, second.settings) << testing::PrintToString(flags);
-  EXPECT_EQ(first.log_level, second.log_level);
+  EXPECT_EQ(first.log, second.log);
   std::filesystem::remove(file);
 }
 

@@ -42,6 +42,8 @@ class RecordingRenderer final : public FrameRenderer {
     log_.push_back({{input.poses.begin(), input.poses.end()}, input, frame});
     return frame;
   }
+  void set_rate(const RateSplit& rate) override { renderer_->set_rate(rate); }
+  const std::string& encoder() const override { return renderer_->encoder(); }
 
  private:
   std::unique_ptr<FrameRenderer> renderer_;

@@ -120,6 +120,15 @@ TEST_F(MetaSockets, FramesCrossBothWaysInOrder) {
   EXPECT_FALSE(server->send(FrameType::meta, {}).ok());
 }
 
+TEST_F(MetaSockets, AByeMayHaveAReason) {
+  listen();
+  connect(client_settings());
+  server->close(absl::CancelledError("closing time"));
+  ASSERT_TRUE(run_until([&] { return client_closed && server_closed; }));
+  EXPECT_EQ(*client_closed, absl::CancelledError("closing time"));
+  EXPECT_EQ(*server_closed, absl::CancelledError("closing time"));
+}
+
 TEST_F(MetaSockets, AWrongTokenIsRefusedByName) {
   listen();
   connect(client_settings(2));

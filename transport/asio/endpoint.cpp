@@ -1,6 +1,7 @@
 #include "transport/asio/endpoint.h"
 
 #include <algorithm>
+#include <boost/asio/io_context.hpp>
 
 namespace tessera::transport {
 
@@ -29,9 +30,35 @@ asio::ip::udp::endpoint udp_endpoint(const PeerAddress& address, bool ipv6_socke
   return {v6, address.port};
 }
 
+std::string to_string(const PeerAddress& address) {
+  return udp_endpoint(address, false).address().to_string();
+}
+
 std::string to_string(const asio::ip::address& address, uint16_t port) {
   return address.is_v6() ? absl::StrCat("[", address.to_string(), "]:", port)
                          : absl::StrCat(address.to_string(), ":", port);
+}
+
+Status check_tcp_port(const char* protocol, const asio::ip::address& address, uint16_t port) {
+  asio::io_context io;
+  asio::ip::tcp::acceptor acceptor(io);
+  const asio::ip::tcp::endpoint endpoint(address, port);
+  SystemError error;
+  acceptor.open(endpoint.protocol(), error);
+  if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
+  if (!error) acceptor.bind(endpoint, error);
+  if (!error) acceptor.listen(1, error);
+  return error ? bind_error(protocol, address, port, error) : absl::OkStatus();
+}
+
+Status check_udp_port(const asio::ip::address& address, uint16_t port) {
+  asio::io_context io;
+  asio::ip::udp::socket socket(io);
+  const asio::ip::udp::endpoint endpoint(address, port);
+  SystemError error;
+  socket.open(endpoint.protocol(), error);
+  if (!error) socket.bind(endpoint, error);
+  return error ? bind_error("UDP", address, port, error) : absl::OkStatus();
 }
 
 Status bind_error(const char* protocol, const asio::ip::address& address, uint16_t port, SystemError error) {

@@ -5,8 +5,14 @@
 #include <utility>
 
 #include "base/log.h"
+#include "transport/nal.h"
 
 namespace tessera::transport {
+namespace {
+
+constexpr DurationNs kTapKeyFrameIntervalNs = 2 * kNsPerSecond;
+
+}  // namespace
 
 MediaPort::MediaPort(asio::any_io_executor executor, const Clock& clock)
     : clock_(clock), timer_(std::move(executor)) {}
@@ -40,11 +46,10 @@ Status MediaPort::add_session(SessionId session, const SessionToken& token, std:
   }
   const std::lock_guard lock(mutex_);
   TESSERA_RETURN_IF_ERROR(binding_.add(session, token));
-  sessions_[session] = {std::move(sender),
-                        std::make_shared<const MediaSessionEvents>(std::move(events)),
-                        {},
-                        false,
-                        std::move(protection)};
+  Session& made = sessions_[session];
+  made.sender = std::move(sender);
+  made.events = std::make_shared<const MediaSessionEvents>(std::move(events));
+  made.srtp = std::move(protection);
   return absl::OkStatus();
 }
 
@@ -52,8 +57,9 @@ void MediaPort::remove_session(SessionId session, const std::string& reason) {
   const std::lock_guard lock(mutex_);
   const auto found = sessions_.find(session);
   if (found == sessions_.end()) return;
-  if (const auto address = binding_.address_of(session))
-    send(*address, found->second, found->second.sender->make_bye(clock_.now(), reason));
+  const Datagram bye = found->second.sender->make_bye(clock_.now(), reason);
+  if (const auto address = binding_.address_of(session)) send(*address, found->second, bye);
+  for (auto& [id, tap] : found->second.taps) tap->send(*socket_, bye);
   binding_.remove(session);
   sessions_.erase(found);
 }
@@ -127,7 +133,10 @@ void MediaPort::on_feedback(Session& session, std::span<const uint8_t> datagram,
 void MediaPort::pump(SessionId id, Session& session) {
   const auto address = binding_.address_of(id);
   if (!address) return;
-  for (Datagram& datagram : session.sender->poll(clock_.now())) send(*address, session, std::move(datagram));
+  for (Datagram& datagram : session.sender->poll(clock_.now())) {
+    for (auto& [tap_id, tap] : session.taps) tap->send(*socket_, datagram);
+    send(*address, session, std::move(datagram));
+  }
 }
 
 void MediaPort::send(const PeerAddress& to, Session& session, Datagram datagram) {
@@ -177,13 +186,82 @@ StatusOr<double> MediaPort::frame_budget_bits(SessionId session, DurationNs fram
 
 StatusOr<uint32_t> MediaPort::send_frame(SessionId session, TimeNs capture_ns,
                                          std::span<const uint8_t> access_unit, bool key_frame) {
-  const std::lock_guard lock(mutex_);
-  TESSERA_RETURN_IF_ERROR(find_bound(session).status());
-  Session& s = sessions_.at(session);
-  const auto timestamp = s.sender->send_frame(clock_.now(), capture_ns, access_unit, key_frame);
-  pump(session, s);
-  schedule();
+  Calls calls;
+  StatusOr<uint32_t> timestamp;
+  {
+    const std::lock_guard lock(mutex_);
+    TESSERA_RETURN_IF_ERROR(find_bound(session).status());
+    Session& s = sessions_.at(session);
+    timestamp = s.sender->send_frame(clock_.now(), capture_ns, access_unit, key_frame);
+    if (timestamp.ok()) on_sent_frame(s, access_unit, key_frame, calls);
+    pump(session, s);
+    schedule();
+  }
+  for (const auto& call : calls) call();
   return timestamp;
+}
+
+void MediaPort::on_sent_frame(Session& session, std::span<const uint8_t> access_unit, bool key_frame,
+                              Calls& calls) {
+  const TimeNs now = clock_.now();
+  if (key_frame) {
+    session.key_frame_ns = now;
+    session.parameter_sets.clear();
+    for (Nal nal : split_annex_b(access_unit)) {
+      if (nal_type(nal) == kNalSps || nal_type(nal) == kNalPps) append_annex_b(session.parameter_sets, nal);
+    }
+  } else if (!session.taps.empty() && now - session.key_frame_ns >= kTapKeyFrameIntervalNs) {
+    session.key_frame_ns = now;
+    calls.push_back([events = session.events] {
+      if (events->on_key_frame_request) events->on_key_frame_request();
+    });
+  }
+}
+
+StatusOr<TapId> MediaPort::add_tap(SessionId session, const PeerAddress& to,
+                                   const std::optional<SrtpKey>& srtp) {
+  const std::lock_guard lock(mutex_);
+  const auto found = sessions_.find(session);
+  if (found == sessions_.end()) return absl::NotFoundError(absl::StrCat("there is no session ", session));
+  Session& s = found->second;
+  if (s.taps.size() >= kMaxTaps)
+    return absl::ResourceExhaustedError(
+        absl::StrCat("session ", session, " is forwarded to ", kMaxTaps, " receivers already; end one"));
+  TESSERA_ASSIGN_OR_RETURN(auto tap, MediaTap::create(to, s.sender->ids(), srtp));
+  s.taps.emplace(next_tap_, std::move(tap));
+  s.key_frame_ns = clock_.now() - kTapKeyFrameIntervalNs;  // with the next frame
+  return next_tap_++;
+}
+
+void MediaPort::remove_tap(SessionId session, TapId tap) {
+  const std::lock_guard lock(mutex_);
+  const auto found = sessions_.find(session);
+  if (found != sessions_.end()) found->second.taps.erase(tap);
+}
+
+StatusOr<uint64_t> MediaPort::tap_packets(SessionId session, TapId tap) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = sessions_.find(session);
+  if (found == sessions_.end() || !found->second.taps.contains(tap))
+    return absl::NotFoundError(absl::StrCat("session ", session, " has ended"));
+  return found->second.taps.at(tap)->packets();
+}
+
+StatusOr<StreamIds> MediaPort::stream_ids(SessionId session) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = sessions_.find(session);
+  if (found == sessions_.end()) return absl::NotFoundError(absl::StrCat("there is no session ", session));
+  return found->second.sender->ids();
+}
+
+StatusOr<std::vector<uint8_t>> MediaPort::parameter_sets(SessionId session) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = sessions_.find(session);
+  if (found == sessions_.end()) return absl::NotFoundError(absl::StrCat("there is no session ", session));
+  if (found->second.parameter_sets.empty())
+    return absl::FailedPreconditionError(
+        absl::StrCat("session ", session, " has sent no frame yet; connect its client first"));
+  return found->second.parameter_sets;
 }
 
 Status MediaPort::set_rate(SessionId session, double rate_bps) {

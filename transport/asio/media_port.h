@@ -14,6 +14,7 @@
 #include "base/status.h"
 #include "base/time.h"
 #include "transport/asio/asio.h"
+#include "transport/asio/media_tap.h"
 #include "transport/asio/udp_socket.h"
 #include "transport/rtp_sender.h"
 #include "transport/session_binding.h"
@@ -45,6 +46,20 @@ class MediaPort : public std::enable_shared_from_this<MediaPort> {
   // Says BYE to the client.
   void remove_session(SessionId session, const std::string& reason);
 
+  // Sends the session's video to another address too, in its own SRTP if `srtp` is given, for players that
+  // know nothing of sessions. A tapped stream has a key frame every two seconds, so that they may begin at
+  // any time. NotFound; ResourceExhausted: kMaxTaps. Taps end with their session.
+  StatusOr<TapId> add_tap(SessionId session, const PeerAddress& to, const std::optional<SrtpKey>& srtp);
+  void remove_tap(SessionId session, TapId tap);
+  // Of video that a tap was sent. NotFound: the tap, or its session, is no more.
+  StatusOr<uint64_t> tap_packets(SessionId session, TapId tap) const;
+  // NotFound.
+  StatusOr<StreamIds> stream_ids(SessionId session) const;
+  // SPS and PPS (Annex B) of the newest key frame, for make_sdp(). NotFound; FailedPrecondition: there was
+  // none yet.
+  StatusOr<std::vector<uint8_t>> parameter_sets(SessionId session) const;
+  static constexpr size_t kMaxTaps = 4;  // of a session
+
   // See RtpSender. NotFound: no such session. FailedPrecondition: its client has not said hello yet.
   StatusOr<double> frame_budget_bits(SessionId session, DurationNs frame_interval_ns, bool key_frame) const;
   StatusOr<uint32_t> send_frame(SessionId session, TimeNs capture_ns, std::span<const uint8_t> access_unit,
@@ -64,6 +79,9 @@ class MediaPort : public std::enable_shared_from_this<MediaPort> {
     NewestPose newest_pose;
     bool left = false;
     std::unique_ptr<Srtp> srtp;  // empty: clear text
+    std::map<TapId, std::unique_ptr<MediaTap>> taps;
+    std::vector<uint8_t> parameter_sets;
+    TimeNs key_frame_ns = 0;  // when the last one was sent, or asked for on account of taps
   };
   using Calls = std::vector<std::function<void()>>;
 
@@ -74,6 +92,7 @@ class MediaPort : public std::enable_shared_from_this<MediaPort> {
   void log_dropped();
   void send(const PeerAddress& to, Session& session, Datagram datagram);
   void pump(SessionId id, Session& session);
+  void on_sent_frame(Session& session, std::span<const uint8_t> access_unit, bool key_frame, Calls& calls);
   void schedule();
   void on_timer();
   StatusOr<const Session*> find_bound(SessionId session) const;
@@ -86,6 +105,7 @@ class MediaPort : public std::enable_shared_from_this<MediaPort> {
   SessionBinding binding_;
   std::map<SessionId, Session> sessions_;
   LogLimiter drop_log_;
+  TapId next_tap_ = 1;
   bool closed_ = false;
 };
 

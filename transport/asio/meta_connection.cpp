@@ -86,7 +86,10 @@ void MetaConnection::on_read(SystemError error, size_t bytes) {
 
 Status MetaConnection::on_frame(FrameType type, std::span<const uint8_t> payload) {
   if (type == FrameType::bye) {
-    finish(absl::OkStatus());
+    const auto message = decode_bye(payload);
+    finish(!message.ok()             ? message.status()
+           : message->reason.empty() ? absl::OkStatus()
+                                     : absl::CancelledError(message->reason));
   } else if (type == FrameType::error) {
     const auto message = decode_error(payload);
     finish(message.ok() ? to_status(*message) : message.status());
@@ -173,9 +176,9 @@ void MetaConnection::watch_stall() {
 
 std::vector<uint8_t> MetaConnection::last_frame(const Status& reason) {
   std::vector<uint8_t> out;
-  const bool bye = reason.ok();
-  const auto payload =
-      bye ? encode(ByeMessage{}) : encode(ErrorMessage{error_code(reason), std::string(reason.message())});
+  const bool bye = reason.ok() || absl::IsCancelled(reason);
+  const auto payload = bye ? encode(ByeMessage{std::string(reason.message())})
+                           : encode(ErrorMessage{error_code(reason), std::string(reason.message())});
   (void)write_frame(bye ? FrameType::bye : FrameType::error, payload, out);  // always short enough
   return out;
 }

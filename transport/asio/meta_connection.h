@@ -31,7 +31,7 @@ struct MetaConnectionSettings {
 struct MetaConnectionEvents {
   // An error closes the connection and is told to the peer.
   std::function<Status(FrameType, std::span<const uint8_t>)> on_frame;
-  // Once, last. OK: either end said bye; else why.
+  // Once, last. OK: either end said bye; Cancelled: the same, with a reason; else what went wrong.
   std::function<void(const Status&)> on_closed;
 };
 
@@ -47,7 +47,7 @@ class MetaConnection : public std::enable_shared_from_this<MetaConnection> {
   // DeadlineExceeded: the peer is too slow, the queue would exceed max_queued_bytes; the connection closes.
   // FailedPrecondition: it is closed.
   Status send(FrameType type, std::span<const uint8_t> payload);
-  // Sends what is queued, then a bye (OK) or an error frame with the reason, then closes.
+  // Sends what is queued, then a bye (OK, or Cancelled with a reason) or an error frame, then closes.
   void close(Status reason);
 
   size_t queued_bytes() const;

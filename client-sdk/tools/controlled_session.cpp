@@ -1,0 +1,77 @@
+#include "client-sdk/tools/controlled_session.h"
+
+#include <absl/strings/strip.h>
+#include <grpcpp/grpcpp.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+namespace tessera::client {
+namespace {
+
+Status to_status(const grpc::Status& status) {
+  return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+}
+
+StatusOr<std::shared_ptr<grpc::ChannelCredentials>> credentials(const ControlSettings& settings) {
+  if (!settings.authority_file) return grpc::InsecureChannelCredentials();
+  grpc::SslCredentialsOptions options;
+  if (!settings.authority_file->empty()) {
+    std::stringstream pem;
+    pem << std::ifstream(*settings.authority_file).rdbuf();
+    options.pem_root_certs = pem.str();
+    if (options.pem_root_certs.empty())
+      return absl::InvalidArgumentError(absl::StrCat("--ca ", *settings.authority_file, ": cannot read it"));
+  }
+  return grpc::SslCredentials(options);
+}
+
+std::string host_of(absl::string_view endpoint) {
+  absl::string_view host = endpoint.substr(0, endpoint.rfind(':'));
+  if (absl::ConsumePrefix(&host, "[")) absl::ConsumeSuffix(&host, "]");
+  return std::string(host);
+}
+
+}  // namespace
+
+StatusOr<std::unique_ptr<ControlledSession>> ControlledSession::create(const ControlSettings& settings,
+                                                                       const std::string& scene) {
+  TESSERA_ASSIGN_OR_RETURN(const auto channel_credentials, credentials(settings));
+  std::unique_ptr<ControlledSession> session(new ControlledSession);
+  session->stub_ = v1::Control::NewStub(grpc::CreateChannel(settings.endpoint, channel_credentials));
+  grpc::ClientContext context;
+  v1::CreateSessionRequest request;
+  request.set_scene(scene);
+  v1::Ticket made;
+  if (const Status status = to_status(session->stub_->CreateSession(&context, request, &made)); !status.ok())
+    return absl::Status(status.code(),
+                        absl::StrCat("control at ", settings.endpoint, ": ", status.message()));
+  session->id_ = made.session();
+  session->ticket_ = {.host = host_of(settings.endpoint),
+                      .meta_port = static_cast<uint16_t>(made.meta_port()),
+                      .authority_file = settings.authority_file};
+  if (made.token().size() != session->ticket_.token.size())
+    return absl::InternalError("the ticket's token has a wrong size");
+  std::ranges::copy(made.token(), session->ticket_.token.begin());
+  return session;
+}
+
+void ControlledSession::record_frames() {
+  reader_ = std::make_unique<FrameReader>(*stub_, id_);
+}
+
+std::vector<FrameRecord> ControlledSession::frames() {
+  return reader_ ? reader_->finish() : std::vector<FrameRecord>();
+}
+
+ControlledSession::~ControlledSession() {
+  if (id_ == 0 || kept_) return;
+  grpc::ClientContext context;
+  v1::DeleteSessionRequest request;
+  request.set_session(id_);
+  v1::DeleteSessionResponse response;
+  stub_->DeleteSession(&context, request, &response);
+}
+
+}  // namespace tessera::client

@@ -1,0 +1,40 @@
+// Collects a session's frame records from a daemon, beside whatever else goes on.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/frame_record.h"
+#include "tessera/v1/control.grpc.pb.h"
+
+namespace tessera {
+
+class FrameReader {
+ public:
+  // `control` outlives the reader.
+  FrameReader(v1::Control::Stub& control, uint64_t session);
+  ~FrameReader();
+  FrameReader(const FrameReader&) = delete;
+  FrameReader& operator=(const FrameReader&) = delete;
+
+  // All records so far, those included that the daemon has not sent yet. Call it once, while the session
+  // lives.
+  std::vector<FrameRecord> finish();
+
+ private:
+  void read(grpc::ClientContext& context, bool once);
+  void stop();
+
+  v1::Control::Stub& control_;
+  const uint64_t session_;
+  uint64_t next_ = 0;  // index
+  std::vector<FrameRecord> records_;
+  grpc::ClientContext watching_;
+  std::thread thread_;  // last: it uses all of the above
+};
+
+}  // namespace tessera
