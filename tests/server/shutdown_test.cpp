@@ -68,8 +68,6 @@ class ShutdownTest : public testing::Test {
                                                     grpc::InsecureChannelCredentials()));
   }
   StatusOr<std::unique_ptr<client::Connection>> connect_client() {
-    const auto control = v1::Control::NewStub(grpc::CreateChannel(
-        "127.0.0.1:" + std::to_string(control_port_), grpc::InsecureChannelCredentials()));
     grpc::ClientContext context;
     v1::CreateSessionRequest request;
     request.set_scene("hall");
