@@ -81,8 +81,8 @@ void MetaListener::accept() {
 // Whoever comes in masses is not waited for: what the system does not take at once is not said.
 void MetaListener::refuse(asio::ip::tcp::socket socket) {
   if (const auto count = refusal_log_.event(SteadyClock().now()))
-    spdlog::warn("meta port {}: refused {} connections: {} others have not said hello", port_, *count,
-                 waiting_.size());
+    log_event(spdlog::level::warn, "connections refused",
+              {{"port", port_}, {"count", *count}, {"others_without_hello", waiting_.size()}});
   if (settings_.tls) return;  // nothing can be said before the handshake
   std::vector<uint8_t> frame;
   (void)write_frame(

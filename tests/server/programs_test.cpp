@@ -1,4 +1,5 @@
-// R14: SIGTERM, and more of them, end tesserad amid its work, with exit code 0, and clients are told.
+// The programs as processes. R13: a viewer is killed. R14: SIGTERM, and more of them, end tesserad amid its
+// work, with exit code 0, and clients are told.
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <signal.h>
@@ -11,6 +12,7 @@
 #include <thread>
 
 #include "client-sdk/connection.h"
+#include "client-sdk/ticket.h"
 #include "tessera/v1/control.grpc.pb.h"
 #include "tests/transport/child_process.h"
 #include "transport/asio/asio.h"
@@ -23,7 +25,7 @@ using transport::test::ChildProcess;
 
 constexpr DurationNs kPatienceNs = 60 * kNsPerSecond;  // only a hang takes so long
 
-class ShutdownTest : public testing::Test {
+class ProgramsTest : public testing::Test {
  protected:
   void launch(const std::string& scene) {
     daemon_ = std::make_unique<ChildProcess>(
@@ -67,7 +69,7 @@ class ShutdownTest : public testing::Test {
     return v1::Control::NewStub(grpc::CreateChannel("127.0.0.1:" + std::to_string(control_port_),
                                                     grpc::InsecureChannelCredentials()));
   }
-  StatusOr<std::unique_ptr<client::Connection>> connect_client() {
+  v1::Ticket create_session() {
     grpc::ClientContext context;
     v1::CreateSessionRequest request;
     request.set_scene("hall");
@@ -75,7 +77,19 @@ class ShutdownTest : public testing::Test {
     request.mutable_settings()->set_atlas_height(256);
     v1::Ticket ticket;
     const grpc::Status created = control()->CreateSession(&context, request, &ticket);
-    if (!created.ok()) return absl::UnavailableError(created.error_message());
+    EXPECT_TRUE(created.ok()) << created.error_message();
+    return ticket;
+  }
+  v1::Session session(const v1::Ticket& ticket) {
+    grpc::ClientContext context;
+    v1::GetSessionRequest request;
+    request.set_session(ticket.session());
+    v1::Session found;
+    EXPECT_TRUE(control()->GetSession(&context, request, &found).ok());
+    return found;
+  }
+  StatusOr<std::unique_ptr<client::Connection>> connect_client() {
+    const v1::Ticket ticket = create_session();
     client::ConnectionSettings settings{.meta_port = meta_port_};
     std::ranges::copy(ticket.token(), settings.token.begin());
     settings.client = {
@@ -90,7 +104,31 @@ class ShutdownTest : public testing::Test {
   uint16_t meta_port_ = 0;
 };
 
-TEST_F(ShutdownTest, WhileClientsConnect) {
+TEST_F(ProgramsTest, AKilledViewerMayComeAgainWithItsTicket) {
+  launch("hall=gallery:0");
+  ASSERT_TRUE(poll_until([&] { return serving(); })) << log();
+  const auto other = connect_client();
+  ASSERT_TRUE(other.ok()) << other.status();
+  const v1::Ticket ticket = create_session();
+  client::Ticket written{.host = "127.0.0.1", .meta_port = meta_port_};
+  std::ranges::copy(ticket.token(), written.token.begin());
+  const std::string view = std::string(TESSERA_CLIENT) + " --ticket " + client::to_string(written) +
+                           " --width 160 --height 90 --seconds ";
+  {
+    ChildProcess viewer(view + "60", folder_.file("killed"));
+    ASSERT_TRUE(poll_until([&] { return session(ticket).frames_sent() >= 5; }));
+    viewer.signal(SIGKILL);
+    ASSERT_TRUE(poll_until([&] { return !session(ticket).connected(); }));
+  }
+  ChildProcess again(view + "0.3", folder_.file("again"));
+  ASSERT_TRUE(poll_until([&] { return again.exit_code().has_value(); }));
+  EXPECT_EQ(again.exit_code(), 0);
+  (*other)->send_pose({clock_.now(), {dvec3(0, 1.6, 0), {1, 0, 0, 0}}});
+  EXPECT_TRUE(poll_until([&] { return (*other)->take_newest() != nullptr; })) << (*other)->status();
+  expect_end();
+}
+
+TEST_F(ProgramsTest, DaemonEndsWhileClientsConnect) {
   launch("hall=gallery:0");
   ASSERT_TRUE(poll_until([&] { return serving(); })) << log();
   namespace asio = transport::asio;
@@ -103,7 +141,7 @@ TEST_F(ShutdownTest, WhileClientsConnect) {
   expect_end();
 }
 
-TEST_F(ShutdownTest, WhileASceneLoadsOnRequest) {
+TEST_F(ProgramsTest, DaemonEndsWhileASceneLoadsOnRequest) {
   launch("hall=gallery:0");
   ASSERT_TRUE(poll_until([&] { return serving(); })) << log();
   std::atomic<bool> calling = false;
@@ -121,7 +159,7 @@ TEST_F(ShutdownTest, WhileASceneLoadsOnRequest) {
   caller.join();
 }
 
-TEST_F(ShutdownTest, UnderLoadClientsAreTold) {
+TEST_F(ProgramsTest, DaemonEndsUnderLoadAndTellsItsClients) {
   launch("hall=gallery:0");
   ASSERT_TRUE(poll_until([&] { return serving(); })) << log();
   std::atomic<int> streaming = 0;
