@@ -4,60 +4,50 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "absl/strings/str_split.h"
-
 namespace tessera {
 namespace {
 
-// Between the parts of an event on its way through spdlog, which carries plain text.
-constexpr char kFieldMark = '\x1e', kTextMark = '\x1f';
+// Before an event whose fields are JSON already, on its way through spdlog, which carries plain text.
+constexpr char kJsonMark = '\x1e';
 
-bool is_control(char c) {
-  return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-}
+std::atomic<LogFormat> format_in_force = LogFormat::text;
 
 // As JSON has it, which keeps a line whole in text as well.
-std::string quoted(absl::string_view text) {
+std::string json_text(absl::string_view text) {
   return nlohmann::json(std::string(text)).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-std::string as_text(absl::string_view value, absl::string_view special) {
-  const bool plain = !value.empty() && std::none_of(value.begin(), value.end(), [&](char c) {
-    return is_control(c) || special.find(c) != special.npos;
+// As it is, unless it has control characters or some that mean something.
+std::string as_text(absl::string_view text, absl::string_view special) {
+  const bool plain = !text.empty() && std::none_of(text.begin(), text.end(), [&](char c) {
+    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f || special.find(c) != special.npos;
   });
-  return plain ? std::string(value) : quoted(value);
+  return plain ? std::string(text) : json_text(text);
 }
 
-// %* in the pattern: the event with its fields.
-class EventFlag final : public spdlog::custom_flag_formatter {
+// %* in the pattern: what is logged, whoever logs it.
+class PayloadFlag final : public spdlog::custom_flag_formatter {
  public:
-  explicit EventFlag(LogFormat format) : format_(format) {}
+  explicit PayloadFlag(LogFormat format) : format_(format) {}
   std::unique_ptr<custom_flag_formatter> clone() const override {
-    return std::make_unique<EventFlag>(format_);
+    return std::make_unique<PayloadFlag>(format_);
   }
   void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& out) override {
     const absl::string_view payload(message.payload.data(), message.payload.size());
-    const std::vector<absl::string_view> parts = absl::StrSplit(payload, kFieldMark);
-    const bool json = format_ == LogFormat::json;
-    std::string line = json ? absl::StrCat("\"event\":", quoted(parts[0])) : as_text(parts[0], "");
-    for (size_t i = 1; i < parts.size(); ++i) {
-      // key, mark, value of a number; key, mark, mark, value of a text
-      std::pair<absl::string_view, absl::string_view> field =
-          absl::StrSplit(parts[i], absl::MaxSplits(kTextMark, 1));
-      const bool text = !field.second.empty() && field.second.front() == kTextMark;
-      if (text) field.second.remove_prefix(1);
-      if (json) {
-        absl::StrAppend(&line, ",\"", field.first,
-                        "\":", text ? quoted(field.second) : std::string(field.second));
-      } else {
-        absl::StrAppend(&line, " ", field.first, "=", as_text(field.second, " \"=\\"));
-      }
+    std::string text;
+    if (format_ == LogFormat::text) {
+      text = as_text(payload, "");
+    } else if (!payload.empty() && payload[0] == kJsonMark) {
+      text = std::string(payload.substr(1));
+    } else {
+      text = absl::StrCat("\"event\":", json_text(payload));
     }
-    out.append(line.data(), line.data() + line.size());
+    out.append(text.data(), text.data() + text.size());
   }
 
  private:
@@ -67,10 +57,11 @@ class EventFlag final : public spdlog::custom_flag_formatter {
 }  // namespace
 
 void init_logging(std::string_view level, LogFormat format) {
+  format_in_force = format;
   auto logger = spdlog::get("tessera");
   if (!logger) logger = spdlog::stderr_color_mt("tessera");
   auto formatter = std::make_unique<spdlog::pattern_formatter>();
-  formatter->add_flag<EventFlag>('*', format);
+  formatter->add_flag<PayloadFlag>('*', format);
   formatter->set_pattern(format == LogFormat::json ? R"({"time":"%Y-%m-%dT%H:%M:%S.%e%z","level":"%l",%*})"
                                                    : "%Y-%m-%dT%H:%M:%S.%e %^%l%$ %*");
   logger->set_formatter(std::move(formatter));
@@ -83,16 +74,16 @@ void init_logging(std::string_view level, LogFormat format) {
 void log_event(spdlog::level::level_enum level, std::string_view event,
                std::initializer_list<LogField> fields) {
   if (!spdlog::should_log(level)) return;
+  const bool json = format_in_force == LogFormat::json;
   std::string payload(event);
+  if (json) payload = absl::StrCat(std::string(1, kJsonMark), "\"event\":", json_text(payload));
   for (const LogField& field : fields) {
-    std::string value = field.value;
-    std::replace_if(
-        value.begin(), value.end(), [](char c) { return c == kFieldMark || c == kTextMark; }, '?');
-    payload += kFieldMark;
-    payload += field.key;
-    payload += kTextMark;
-    if (!field.number) payload += kTextMark;
-    payload += value;
+    const std::string key(field.key);
+    if (json) {
+      absl::StrAppend(&payload, ",\"", key, "\":", field.number ? field.value : json_text(field.value));
+    } else {
+      absl::StrAppend(&payload, " ", key, "=", as_text(field.value, " \"=\\"));
+    }
   }
   spdlog::log(level, spdlog::string_view_t(payload.data(), payload.size()));
 }

@@ -30,7 +30,8 @@ constexpr size_t kLogTail = 2000;  // characters of a failed program's output th
 
 Status to_status(const grpc::Status& status, const char* call) {
   if (status.ok()) return absl::OkStatus();
-  return {static_cast<absl::StatusCode>(status.error_code()), absl::StrCat(call, ": ", status.error_message())};
+  return {static_cast<absl::StatusCode>(status.error_code()),
+          absl::StrCat(call, ": ", status.error_message())};
 }
 
 Status failed(const char* what, const Program& program, int code) {
@@ -55,13 +56,14 @@ Status write_path(const CameraPath& path, DurationNs start, const std::filesyste
   const TimeNs first = path.poses().front().time_ns + start;
   const auto line = [&](TimeNs t, const Pose& pose) {
     const auto& [p, q] = pose;
-    out << to_seconds(t - first) << ',' << p.x << ',' << p.y << ',' << p.z << ',' << q.x << ',' << q.y << ',' << q.z
-        << ',' << q.w << '\n';
+    out << to_seconds(t - first) << ',' << p.x << ',' << p.y << ',' << p.z << ',' << q.x << ',' << q.y << ','
+        << q.z << ',' << q.w << '\n';
   };
   line(first, path.at(first));
   for (const TimedPose& pose : path.poses())
     if (pose.time_ns > first) line(pose.time_ns, pose.pose);
-  return out.flush() ? absl::OkStatus() : absl::UnavailableError(absl::StrCat("cannot write ", file.string()));
+  return out.flush() ? absl::OkStatus()
+                     : absl::UnavailableError(absl::StrCat("cannot write ", file.string()));
 }
 
 std::string ticket_text(const v1::Ticket& ticket) {
@@ -92,7 +94,8 @@ class RealLoopback {
   Status wait_for_viewers();
   Status end_daemon();
   Status score_pictures();
-  Status score_picture(const json& saved, TruthSource& truth, const MaskedTriangles& masked, ErrorMean& error);
+  Status score_picture(const json& saved, TruthSource& truth, const MaskedTriangles& masked,
+                       ErrorMean& error);
   void keep(const FramePictures& pictures, const Comparison& comparison, bool worst);
   void fill_row(const Viewer& viewer, uint32_t session);
   std::filesystem::path file(const std::string& name) const { return folder_.path() / name; }
@@ -112,14 +115,15 @@ Status RealLoopback::start_daemon() {
   TESSERA_ASSIGN_OR_RETURN(
       daemon_,
       Program::start({.file = sibling_program("tesserad"),
-                      .arguments = {"--scene", "scene=" + s_.scene, "--device", s_.device, "--control-port", "0",
-                                    "--meta-port", "0", "--media-port", "0", "--http-port", "0", "--max-sessions",
-                                    absl::StrCat(s_.sessions), "--log-format", "json"},
+                      .arguments = {"--scene", "scene=" + s_.scene, "--device", s_.device, "--control-port",
+                                    "0", "--meta-port", "0", "--media-port", "0", "--http-port", "0",
+                                    "--max-sessions", absl::StrCat(s_.sessions), "--log-format", "json"},
                       .log = file("tesserad.log")}));
   while (true) {
     if (const auto line = serving_line(daemon_->output())) {
-      control_ = v1::Control::NewStub(grpc::CreateChannel(
-          absl::StrCat("127.0.0.1:", line->at("control_port").get<int>()), grpc::InsecureChannelCredentials()));
+      control_ = v1::Control::NewStub(
+          grpc::CreateChannel(absl::StrCat("127.0.0.1:", line->at("control_port").get<int>()),
+                              grpc::InsecureChannelCredentials()));
       return describe_daemon();
     }
     if (const auto code = daemon_->exit_code()) return failed("tesserad", *daemon_, *code);
@@ -136,7 +140,8 @@ Status RealLoopback::describe_daemon() {
   v1::ListScenesResponse scenes;
   TESSERA_RETURN_IF_ERROR(to_status(control_->ListScenes(&scenes_context, {}, &scenes), "ListScenes"));
   for (const v1::Pass& pass : scenes.scenes(0).plan())
-    absl::StrAppend(&result_.plan, pass.included() ? "in   " : "out  ", pass.name(), ": ", pass.reason(), "\n");
+    absl::StrAppend(&result_.plan, pass.included() ? "in   " : "out  ", pass.name(), ": ", pass.reason(),
+                    "\n");
   scene_device_mib_ = scenes.scenes(0).device_mib();
   return absl::OkStatus();
 }
@@ -153,10 +158,13 @@ Status RealLoopback::start_viewer(uint32_t index) {
   TESSERA_RETURN_IF_ERROR(
       to_status(control_->CreateSession(&context, request, &viewer.ticket), "CreateSession"));
   viewer.frames = std::make_unique<FrameReader>(*control_, viewer.ticket.session());
-  std::vector<std::string> arguments{"--path", file("path.csv"), "--seconds", absl::StrCat(s_.seconds),
-                                     "--fps", absl::StrCat(s_.fps), "--width", absl::StrCat(s_.size.width),
-                                     "--height", absl::StrCat(s_.size.height), "--fov-y", absl::StrCat(s_.fov_y_deg),
-                                     "--json", file(absl::StrCat("client", index, ".json"))};
+  std::vector<std::string> arguments{"--path",    file("path.csv"),
+                                     "--seconds", absl::StrCat(s_.seconds),
+                                     "--fps",     absl::StrCat(s_.fps),
+                                     "--width",   absl::StrCat(s_.size.width),
+                                     "--height",  absl::StrCat(s_.size.height),
+                                     "--fov-y",   absl::StrCat(s_.fov_y_deg),
+                                     "--json",    file(absl::StrCat("client", index, ".json"))};
   if (index == 0) {
     const std::string pictures = file("pictures");
     arguments.insert(arguments.end(), {"--out", pictures, "--save-every", absl::StrCat(s_.score_every)});
@@ -192,11 +200,12 @@ Status RealLoopback::end_daemon() {
 }
 
 Status RealLoopback::score_pictures() {
-  TESSERA_ASSIGN_OR_RETURN(const auto device, gpu::Device::create({.select = s_.device, .validation = s_.validation}));
+  TESSERA_ASSIGN_OR_RETURN(const auto device,
+                           gpu::Device::create({.select = s_.device, .validation = s_.validation}));
   TESSERA_ASSIGN_OR_RETURN(const auto scene, scene::load_scene(s_.scene));
   TESSERA_ASSIGN_OR_RETURN(const auto shared, server::SharedScene::create(device, scene));
-  TESSERA_ASSIGN_OR_RETURN(const auto truth, TruthSource::create(shared, s_.scene, "none",
-                                                                 s_.truth == Truth::one ? 1 : 4));
+  TESSERA_ASSIGN_OR_RETURN(const auto truth,
+                           TruthSource::create(shared, s_.scene, "none", s_.truth == Truth::one ? 1 : 4));
   const MaskedTriangles masked(*scene);
   const json& saved = viewers_[0].report.at("saved");
   ErrorMean error;
@@ -219,8 +228,8 @@ Status RealLoopback::score_picture(const json& saved, TruthSource& truth, const 
   if (record == records.end() || record->client.clock_error < 0) return absl::OkStatus();
   const auto p = saved.at("position"), q = saved.at("orientation_xyzw");
   View view = client_view(s_);
-  view.pose = {dvec3(p[0], p[1], p[2]), dquat(q[3].get<double>(), q[0].get<double>(), q[1].get<double>(),
-                                              q[2].get<double>())};
+  view.pose = {dvec3(p[0], p[1], p[2]),
+               dquat(q[3].get<double>(), q[0].get<double>(), q[1].get<double>(), q[2].get<double>())};
   const TimeNs scene_time =
       record->scene_time + displayed + record->client.clock_offset - record->server.render_begin;
 

@@ -1,5 +1,5 @@
-// The product as its users run it: tesserad and tessera-clients as processes, over loopback sockets and by the
-// real clock. Measures latency; the first client's pictures are scored after the run.
+// The product as its users run it: tesserad and tessera-clients as processes, over loopback sockets and by
+// the real clock. Measures latency; the first client's pictures are scored after the run.
 #pragma once
 
 #include "base/status.h"

@@ -12,7 +12,7 @@ set(TESSERA_MAY_USE_shading base gpu scene atlas)
 set(TESSERA_MAY_USE_codec base gpu)
 set(TESSERA_MAY_USE_geometry-compression "")
 set(TESSERA_MAY_USE_transport base)
-set(TESSERA_MAY_USE_client-sdk base codec geometry-compression transport)
+set(TESSERA_MAY_USE_client-sdk base proto codec geometry-compression transport)
 set(TESSERA_MAY_USE_server base gpu scene pvs atlas shading codec geometry-compression transport proto)
 set(TESSERA_MAY_USE_bench ${TESSERA_ROOMS})
 

@@ -71,6 +71,12 @@ StatusOr<StreamServerSettings> stream_settings(const DaemonSettings& s) {
   return out;
 }
 
+Status check(const DaemonSettings& settings) {
+  TESSERA_RETURN_IF_ERROR(stream_settings(settings).status());
+  for (const std::string& scene : settings.scenes) TESSERA_RETURN_IF_ERROR(name_and_source(scene).status());
+  return absl::OkStatus();
+}
+
 const char* version() {
   return TESSERA_VERSION;
 }
@@ -96,6 +102,7 @@ struct Daemon::Impl {
 
 Status Daemon::Impl::start(const DaemonSettings& settings, const Clock& clock) {
   gpr_set_log_function(log_of_grpc);
+  TESSERA_RETURN_IF_ERROR(check(settings));  // before scenes take their time
   TESSERA_ASSIGN_OR_RETURN(StreamServerSettings stream, stream_settings(settings));
   TESSERA_RETURN_IF_ERROR(serve_pages(settings, stream));
   TESSERA_ASSIGN_OR_RETURN(device, gpu::Device::create({.select = settings.device}));

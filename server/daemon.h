@@ -37,6 +37,8 @@ struct DaemonSettings {
 StatusOr<StreamServerSettings> stream_settings(const DaemonSettings& settings);
 // Of a scene option. InvalidArgument: not NAME=SOURCE.
 StatusOr<std::pair<std::string, std::string>> name_and_source(const std::string& scene);
+// Both of these, of all settings; ports, scenes and devices are not touched.
+Status check(const DaemonSettings& settings);
 const char* version();
 
 class Daemon {

@@ -1,8 +1,12 @@
 #include "server/doctor.h"
 
+#include <openssl/pem.h>
+#include <openssl/x509.h>
+
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <memory>
 
 #include "codec/video_encoder.h"
 #include "gpu/device.h"
@@ -20,10 +24,23 @@ Detail described(const Status& status, std::string detail) {
   return detail;
 }
 
+Detail check_expiry(const std::string& file) {
+  const std::unique_ptr<BIO, decltype(&BIO_free)> in(BIO_new_file(file.c_str(), "r"), &BIO_free);
+  const std::unique_ptr<X509, decltype(&X509_free)> certificate(
+      in ? PEM_read_bio_X509(in.get(), nullptr, nullptr, nullptr) : nullptr, &X509_free);
+  if (!certificate) return absl::InvalidArgumentError(absl::StrCat(file, " holds no certificate"));
+  int days = 0, seconds = 0;
+  ASN1_TIME_diff(&days, &seconds, nullptr, X509_get0_notAfter(certificate.get()));
+  if (days < 0 || seconds < 0)
+    return absl::FailedPreconditionError(
+        absl::StrCat("the certificate ", file, " has expired: clients will refuse it; renew it"));
+  return absl::StrCat("TLS and SRTP, with a certificate that fits its key, for ", days, " days more");
+}
+
 Detail check_configuration(const DaemonSettings& settings) {
   const auto stream = stream_settings(settings);
   if (!stream.ok()) return stream.status();
-  if (stream->meta.tls) return "TLS and SRTP, with a certificate that fits its key";
+  if (stream->meta.tls) return check_expiry(settings.tls_certificate);
   return settings.insecure ? "clear text, as --insecure says" : "clear text, on loopback";
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/beast/http.hpp>
+#include <limits>
 #include <set>
 #include <sstream>
 #include <thread>
@@ -34,6 +35,7 @@ class Exchange : public std::enable_shared_from_this<Exchange> {
         timer_(stream_->executor()),
         in_(settings.max_header_bytes + 1) {
     parser_.header_limit(settings.max_header_bytes);
+    parser_.body_limit(std::numeric_limits<uint64_t>::max());  // no body is read
     timer_.expires_after(std::chrono::nanoseconds(settings.timeout_ns));
   }
   ~Exchange() { done_(this); }

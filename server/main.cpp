@@ -33,7 +33,8 @@ Examples:
   tesserad --print-config > tesserad.toml        # every option with its default
   curl http://127.0.0.1:7313/readyz              # and /metrics, /healthz
 
-Exit codes: 0 ended by a signal, or what was asked for is done; 1 could not start, or doctor found a fault; 2 wrong usage.)";
+Exit codes: 0 ended by a signal, or what was asked for is done; 1 could not start, or doctor found a fault; 2 wrong usage
+or configuration.)";
 
 constexpr std::chrono::milliseconds kShutdownTime{4500};
 
@@ -61,7 +62,8 @@ int serve(const server::DaemonSettings& settings) {
   auto daemon = server::Daemon::start(settings, clock);
   if (!daemon.ok()) {
     std::cerr << "tesserad: " << daemon.status().message() << std::endl;
-    std::_Exit(kFailed);  // past the thread that waits
+    // Past the thread that waits.
+    std::_Exit(absl::IsInvalidArgument(daemon.status()) ? kUsage : kFailed);
   }
   log_event(spdlog::level::info, "serving",
             {{"address", settings.address},
@@ -125,8 +127,10 @@ int main(int argc, char** argv) {
     return kOk;
   }
   if (check_config) {
-    std::cout << "the configuration is right\n";
-    return kOk;
+    const Status status = server::check(settings);
+    if (status.ok()) std::cout << "the configuration is right\n";
+    if (!status.ok()) std::cerr << "tesserad: " << status.message() << std::endl;
+    return status.ok() ? kOk : kUsage;
   }
   if (*doctor) return print_findings(settings, json);
   return serve(settings);

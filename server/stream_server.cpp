@@ -57,11 +57,11 @@ struct MediaStream {
   std::optional<transport::SrtpKeys> srtp;
 };
 
-StatusOr<MediaStream> make_stream(double bitrate_bps, bool encrypted) {
+StatusOr<MediaStream> make_stream(const RateSplit& rate, bool encrypted) {
   MediaStream stream;
   std::array<uint8_t, 8> seed{};
   TESSERA_RETURN_IF_ERROR(fill_random(seed));
-  transport::RtpSenderSettings rtp{.pacer = {.rate_bps = bitrate_bps}};
+  transport::RtpSenderSettings rtp{.pacer = {.rate_bps = rate.bitrate_bps}};
   std::copy(seed.begin(), seed.end(), reinterpret_cast<uint8_t*>(&rtp.seed));
   TESSERA_ASSIGN_OR_RETURN(stream.sender, transport::RtpSender::create(rtp));
   if (encrypted) {
@@ -95,6 +95,7 @@ struct StreamServer::Impl {
   StatusOr<transport::Admission> admit(const transport::Hello& hello, const std::string& peer);
   StatusOr<Entry> find_token(const SessionToken& token) const;
   StatusOr<transport::Welcome> open_media(const Entry& entry);
+  void on_left(StreamedSession& session, const Status& reason);
   transport::MediaSessionEvents media_events(const std::shared_ptr<StreamedSession>& session);
   Status check_room(const SessionSettings& wanted) const;
   void refuse(const Status& reason, const std::string& peer);
@@ -212,7 +213,7 @@ StatusOr<Entry> StreamServer::Impl::find_token(const SessionToken& token) const 
 StatusOr<transport::Welcome> StreamServer::Impl::open_media(const Entry& entry) {
   const SessionSettings& s = entry.session->settings();
   const RateSplit rate = entry.session->rate();
-  TESSERA_ASSIGN_OR_RETURN(MediaStream stream, make_stream(rate.bitrate_bps, settings.meta.tls != nullptr));
+  TESSERA_ASSIGN_OR_RETURN(MediaStream stream, make_stream(rate, settings.meta.tls != nullptr));
   const transport::StreamIds ids = stream.sender->ids();
   TESSERA_RETURN_IF_ERROR(media->add_session(entry.session->id(), entry.token, std::move(stream.sender),
                                              media_events(entry.session), stream.srtp));
@@ -225,6 +226,12 @@ StatusOr<transport::Welcome> StreamServer::Impl::open_media(const Entry& entry) 
                             .srtp = stream.srtp};
 }
 
+void StreamServer::Impl::on_left(StreamedSession& session, const Status& reason) {
+  session.count_media();
+  media->remove_session(session.id(), std::string(reason.message()));
+  session.on_closed(reason);
+}
+
 StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello& hello,
                                                          const std::string& peer) {
   TESSERA_ASSIGN_OR_RETURN(const Entry entry, find_token(hello.token));
@@ -232,7 +239,7 @@ StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello&
   TESSERA_RETURN_IF_ERROR(session->admit(hello.client));
   StatusOr<transport::Welcome> welcome = open_media(entry);
   if (!welcome.ok()) {
-    session->on_closed(welcome.status());
+    on_left(*session, welcome.status());
     return welcome.status();
   }
   log_event(spdlog::level::info, "client connected",
@@ -246,10 +253,10 @@ StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello&
                        return status;
                      },
                  .on_closed =
-                     [session](const Status& reason) {
+                     [this, session](const Status& reason) {
                        log_event(spdlog::level::info, "client left",
                                  {{"session", session->id()}, {"reason", reason.ToString()}});
-                       session->on_closed(reason);
+                       on_left(*session, reason);
                      }},
       .on_connected = [this, session](std::shared_ptr<transport::MetaConnection> connection) {
         session->on_connected(std::move(connection));
@@ -354,11 +361,12 @@ StatusOr<Forwarding> StreamServer::forward(SessionId session, const transport::P
   Impl& s = *impl_;
   transport::SdpSettings sdp{.address = transport::to_string(to), .port = to.port, .retransmission = false};
   TESSERA_RETURN_IF_ERROR(s.find(session).status());
-  const StatusOr<transport::StreamIds> stream = s.media->stream_ids(session);
-  if (!stream.ok())
+  const std::optional<transport::StreamIds> ids = s.media->stream_ids(session);
+  if (!ids) {
     return absl::FailedPreconditionError(
-        absl::StrCat("session ", session, " has no client yet; connect it first"));
-  sdp.stream = *stream;
+        absl::StrCat("session ", session, " has no client, so there is no stream: connect its client first"));
+  }
+  sdp.stream = *ids;
   if (s.settings.meta.tls) {
     sdp.srtp.emplace();
     TESSERA_RETURN_IF_ERROR(fill_random(*sdp.srtp));

@@ -67,11 +67,10 @@ class StreamServer {
   // From the next frame on; the client need not connect again. NotFound.
   Status set_rate(transport::SessionId session, double bitrate_bps, double frames_per_second);
   // Sends the session's video to `to` as well, encrypted where the session is. NotFound;
-  // FailedPrecondition: no client, or no frame was sent to it yet; ResourceExhausted: MediaPort::kMaxTaps. It
-  // ends with the client's stream.
+  // FailedPrecondition: no frame was sent yet; ResourceExhausted: MediaPort::kMaxTaps.
   StatusOr<Forwarding> forward(transport::SessionId session, const transport::PeerAddress& to);
   void end_forward(const Forwarding& forwarding);
-  // Sent so far. NotFound: the session has ended, or its client left.
+  // Sent so far. NotFound: the session has ended, or its client has left.
   StatusOr<uint64_t> forwarded_packets(const Forwarding& forwarding) const;
   // NotFound.
   Status end_session(transport::SessionId session, const std::string& reason);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/log.h"
+
 namespace tessera::server {
 namespace {
 
@@ -63,10 +65,7 @@ void StreamedSession::on_connected(std::shared_ptr<transport::MetaConnection> co
 }
 
 void StreamedSession::on_closed(const Status& reason) {
-  const auto sent = media_->sender_stats(id_);
-  media_->remove_session(id_, std::string(reason.message()));
   const std::lock_guard lock(mutex_);
-  if (sent) stats_.media += *sent;
   connection_.reset();
   poses_.clear();
   under_way_.clear();
@@ -210,8 +209,8 @@ Status StreamedSession::set_rate(double bitrate_bps, double frames_per_second) {
     rate_.bitrate_bps = bitrate_bps;
     rate_.frames_per_second = frames_per_second;
   }
-  const Status status = media_->set_rate(id_, bitrate_bps);
-  return left(status) ? absl::OkStatus() : status;  // the next client's stream begins with it
+  const Status set = media_->set_rate(id_, bitrate_bps);
+  return absl::IsNotFound(set) ? absl::OkStatus() : set;  // the next client's stream begins with it
 }
 
 RateSplit StreamedSession::rate() const {
@@ -251,6 +250,13 @@ Status StreamedSession::render() {
   record.server.render_end = clock_.now();
   put_off();
   count(frame);
+  log_event(spdlog::level::debug, "frame rendered",
+            {{"session", id_},
+             {"frame", frame.number},
+             {"key_frame", frame.atlas.key_frame},
+             {"atlas_bytes", frame.atlas.bytes.size()},
+             {"meta_bytes", frame.meta.size()},
+             {"render_ms", frame.stats.times.total_ms()}});
   if (on_rendered_) on_rendered_(frame.stats);
   return send(work, frame, record);
 }
@@ -289,13 +295,18 @@ void StreamedSession::release() {
   make_renderer_ = {};
 }
 
+void StreamedSession::count_media() {
+  const std::lock_guard lock(mutex_);
+  stats_.media += media_->sender_stats(id_).value_or(transport::RtpSenderStats());
+}
+
 StreamedSessionStats StreamedSession::stats() const {
   const std::lock_guard lock(mutex_);
   StreamedSessionStats stats = stats_;
   stats.connected = connection_ != nullptr;
   for (const auto& [when, bytes] : sent_)
     if (when > clock_.now() - kRateWindowNs) stats.bitrate_bps += 8 * static_cast<double>(bytes);
-  stats.media += media_->sender_stats(id_).value_or(transport::RtpSenderStats{});
+  stats.media += media_->sender_stats(id_).value_or(transport::RtpSenderStats());
   stats.peer = media_->peer_report(id_);
   return stats;
 }

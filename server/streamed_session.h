@@ -21,12 +21,12 @@ namespace tessera::server {
 struct StreamedSessionStats {
   bool connected = false;
   uint64_t frames_sent = 0;
-  uint64_t frames_skipped = 0;                // periods given up: the network still held the frame before
-  uint64_t key_frames = 0;                    // of those sent
-  uint64_t meta_bytes = 0;                    // of geometry sent
-  double bitrate_bps = 0;                     // measured: of the last second's frames, atlas and geometry
-  std::string encoder;                        // which one runs, and why; empty before the first frame
-  transport::RtpSenderStats media;            // of all its clients, one after the other
+  uint64_t frames_skipped = 0;  // periods given up: the network still held the frame before
+  uint64_t key_frames = 0;      // of those sent
+  uint64_t meta_bytes = 0;      // of geometry sent
+  double bitrate_bps = 0;       // measured: of the last second's frames, atlas and geometry
+  std::string encoder;          // which one runs, and why; empty before the first frame
+  transport::RtpSenderStats media;
   std::optional<transport::PeerReport> peer;  // what the client last reported of the media
   DurationNs round_trip_ns = 0;  // from a pose to the picture that shows its frame, as the client reports it
   Status ended;                  // why the client left, or OK
@@ -46,7 +46,9 @@ class StreamedSession {
                   OnRendered on_rendered = {});
 
   void on_connected(std::shared_ptr<transport::MetaConnection> connection);
-  void on_closed(const Status& reason);  // ends the client's media stream, too
+  // Before its stream is taken from the media port.
+  void count_media();
+  void on_closed(const Status& reason);
   void on_bound();
   void on_pose(const transport::SequencedPose& pose);
   void on_key_frame_request();

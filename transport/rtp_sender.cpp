@@ -10,6 +10,19 @@
 #include "transport/report_timer.h"
 
 namespace tessera::transport {
+
+RtpSenderStats& RtpSenderStats::operator+=(const RtpSenderStats& other) {
+  frames += other.frames;
+  packets += other.packets;
+  bytes += other.bytes;
+  retransmitted += other.retransmitted;
+  retransmitted_bytes += other.retransmitted_bytes;
+  nacked += other.nacked;
+  not_retransmitted += other.not_retransmitted;
+  key_frame_requests += other.key_frame_requests;
+  malformed_rtcp += other.malformed_rtcp;
+  return *this;
+}
 namespace {
 
 // One SSRC's counters for sender reports.
@@ -82,19 +95,6 @@ struct RtpSender::Impl {
   std::optional<PeerReport> report;
   RtpSenderStats stats;
 };
-
-RtpSenderStats& RtpSenderStats::operator+=(const RtpSenderStats& other) {
-  frames += other.frames;
-  packets += other.packets;
-  bytes += other.bytes;
-  retransmitted += other.retransmitted;
-  retransmitted_bytes += other.retransmitted_bytes;
-  nacked += other.nacked;
-  not_retransmitted += other.not_retransmitted;
-  key_frame_requests += other.key_frame_requests;
-  malformed_rtcp += other.malformed_rtcp;
-  return *this;
-}
 
 RtpSender::RtpSender(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 RtpSender::~RtpSender() = default;

@@ -1,6 +1,5 @@
 // Sessions, events, poses and frames in C.
 #include <algorithm>
-#include <cstring>
 
 #include "client-sdk/c_api/handles.h"
 #include "client-sdk/c_api/wall.h"
@@ -100,7 +99,7 @@ void fill(TesseraEvent& out, const SessionEvent& event) {
   out.frame = event.frame;
   const absl::string_view text = event.reason.message();
   const size_t size = std::min(text.size(), sizeof(out.reason) - 1);
-  std::memcpy(out.reason, text.data(), size);
+  std::copy_n(text.begin(), size, out.reason);
   out.reason[size] = '\0';
 }
 

@@ -72,7 +72,8 @@ TEST(RealLoopback, PicturesAreThoseOfTheVirtualClock) {
   ASSERT_TRUE(virtual_run.ok()) << virtual_run.status();
   // The daemon counts frames from 1, virtual time from 0.
   std::map<FrameNumber, double> of_frame;
-  for (const DisplayRecord& frame : virtual_run->frames) of_frame[frame.frame + 1] = frame.mssim.at("tessera");
+  for (const DisplayRecord& frame : virtual_run->frames)
+    of_frame[frame.frame + 1] = frame.mssim.at("tessera");
   size_t compared = 0;
   for (const DisplayRecord& frame : real->frames) {
     const auto same = of_frame.find(frame.frame);

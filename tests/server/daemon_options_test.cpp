@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -34,23 +35,34 @@ void expect_round_trip(const std::vector<std::string>& flags) {
   std::filesystem::remove(file);
 }
 
+const std::vector<std::vector<std::string>> kFlags = {{"--address", "::1"},
+                                                      {"--control-port", "0"},
+                                                      {"--meta-port", "65535"},
+                                                      {"--media-port", "1"},
+                                                      {"--http-port", "80"},
+                                                      {"--no-http"},
+                                                      {"--tls-certificate", "a b.pem"},
+                                                      {"--tls-key", "k\"ey.pem"},
+                                                      {"--insecure"},
+                                                      {"--max-sessions", "1024"},
+                                                      {"--max-atlas-mtexels", "1"},
+                                                      {"--max-watchers", "7"},
+                                                      {"--max-scene-mib", "4096"},
+                                                      {"--scene", "a=gallery"},
+                                                      {"--scene", "a=gallery:1", "--scene", "b=my file.glb"},
+                                                      {"--scene-root", "/srv/scenes"},
+                                                      {"--device", "1"},
+                                                      {"--log", "debug"},
+                                                      {"--log-format", "json"}};
+
 TEST(DaemonOptions, EverySettingReadsBackAsItWasWritten) {
   expect_round_trip({});
-  for (const std::vector<std::string>& flags :
-       std::vector<std::vector<std::string>>{{"--address", "::1"},
-                                             {"--control-port", "0"},
-                                             {"--meta-port", "65535"},
-                                             {"--media-port", "1"},
-                                             {"--tls-certificate", "a b.pem"},
-                                             {"--tls-key", "k\"ey.pem"},
-                                             {"--insecure"},
-                                             {"--max-sessions", "1024"},
-                                             {"--scene", "a=gallery"},
-                                             {"--scene", "a=gallery:1", "--scene", "b=my file.glb"},
-                                             {"--scene-root", "/srv/scenes"},
-                                             {"--device", "1"},
-                                             {"--log", "debug"}}) {
-    expect_round_trip(flags);
+  for (const std::vector<std::string>& flags : kFlags) expect_round_trip(flags);
+  Options options;
+  for (const CLI::Option* option : options.app.get_options()) {
+    if (!option->get_configurable() || option->get_name() == "--config") continue;
+    EXPECT_TRUE(std::ranges::any_of(kFlags, [&](const auto& f) { return f[0] == option->get_name(); }))
+        << option->get_name() << " is not tried";
   }
 }
 
@@ -64,8 +76,13 @@ TEST(DaemonOptions, EveryOptionIsAnEnvironmentVariableToo) {
 }
 
 TEST(DaemonOptions, ValuesOutOfRangeAreRefused) {
-  for (const std::vector<std::string>& reversed : std::vector<std::vector<std::string>>{
-           {"0", "--max-sessions"}, {"65536", "--meta-port"}, {"-1", "--media-port"}, {"loud", "--log"}}) {
+  for (const std::vector<std::string>& reversed :
+       std::vector<std::vector<std::string>>{{"0", "--max-sessions"},
+                                             {"65536", "--meta-port"},
+                                             {"-1", "--media-port"},
+                                             {"0", "--max-atlas-mtexels"},
+                                             {"xml", "--log-format"},
+                                             {"loud", "--log"}}) {
     Options options;
     std::vector<std::string> arguments = reversed;
     EXPECT_THROW(options.app.parse(arguments), CLI::ParseError) << testing::PrintToString(reversed);

@@ -1,100 +1,17 @@
 // The whole daemon, steered by gRPC and watched by a real client.
 #include "server/daemon.h"
 
-#include <grpcpp/grpcpp.h>
-#include <gtest/gtest.h>
-
 #include <sys/wait.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <thread>
 
-#include "client-sdk/connection.h"
-#include "server/control_service.h"
-#include "tessera/v1/control.grpc.pb.h"
+#include "daemon_fixture.h"
 
 namespace tessera::server {
 namespace {
-
-constexpr DurationNs kPatienceNs = 60 * kNsPerSecond;  // only a hang takes so long
-
-class DaemonTest : public testing::Test {
- protected:
-  void start(DaemonSettings settings = {}) {
-    settings.control_port = settings.meta_port = settings.media_port = 0;
-    auto daemon = Daemon::start(settings, clock_);
-    ASSERT_TRUE(daemon.ok()) << daemon.status();
-    daemon_ = *std::move(daemon);
-    control_ = v1::Control::NewStub(grpc::CreateChannel(
-        "127.0.0.1:" + std::to_string(daemon_->control_port()), grpc::InsecureChannelCredentials()));
-  }
-
-  grpc::Status load(const std::string& name, const std::string& source, v1::Scene* scene = nullptr) {
-    grpc::ClientContext context;
-    v1::LoadSceneRequest request;
-    request.set_name(name);
-    request.set_source(source);
-    v1::Scene ignored;
-    return control_->LoadScene(&context, request, scene ? scene : &ignored);
-  }
-  grpc::Status unload(const std::string& name) {
-    grpc::ClientContext context;
-    v1::UnloadSceneRequest request;
-    request.set_name(name);
-    v1::UnloadSceneResponse response;
-    return control_->UnloadScene(&context, request, &response);
-  }
-  grpc::Status create(const std::string& scene, v1::Ticket* ticket, uint32_t atlas_width = 512) {
-    grpc::ClientContext context;
-    v1::CreateSessionRequest request;
-    request.set_scene(scene);
-    request.mutable_settings()->set_atlas_width(atlas_width);
-    request.mutable_settings()->set_atlas_height(256);
-    return control_->CreateSession(&context, request, ticket);
-  }
-  grpc::Status remove(uint64_t session) {
-    grpc::ClientContext context;
-    v1::DeleteSessionRequest request;
-    request.set_session(session);
-    request.set_reason("deleted by hand");
-    v1::DeleteSessionResponse response;
-    return control_->DeleteSession(&context, request, &response);
-  }
-  v1::Session get(uint64_t session) {
-    grpc::ClientContext context;
-    v1::GetSessionRequest request;
-    request.set_session(session);
-    v1::Session found;
-    EXPECT_TRUE(control_->GetSession(&context, request, &found).ok());
-    return found;
-  }
-
-  StatusOr<std::unique_ptr<client::Connection>> connect(const v1::Ticket& ticket) {
-    client::ConnectionSettings settings{.meta_port = static_cast<uint16_t>(ticket.meta_port())};
-    EXPECT_EQ(ticket.token().size(), settings.token.size());
-    std::copy(ticket.token().begin(), ticket.token().end(), settings.token.begin());
-    settings.client = {
-        .width = 160, .height = 90, .fov = Fov::symmetric(1.0f, 16.0f / 9.0f), .display_hz = 60};
-    return client::Connection::connect(settings, clock_);
-  }
-  // A display loop until the first pair; null if the session ended before.
-  const client::Pair* first_pair(client::Connection& client) {
-    const TimeNs give_up = clock_.now() + kPatienceNs;
-    while (clock_.now() < give_up && client.status().ok()) {
-      client.send_pose({clock_.now(), {dvec3(0, 1.6, 0), {1, 0, 0, 0}}});
-      if (const client::Pair* pair = client.take_newest()) return pair;
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));  // the display's rate
-    }
-    return nullptr;
-  }
-
-  SteadyClock clock_;
-  std::unique_ptr<Daemon> daemon_;
-  std::unique_ptr<v1::Control::Stub> control_;
-};
 
 TEST_F(DaemonTest, FromLoadToPictureToUnload) {
   start();
@@ -194,19 +111,15 @@ TEST_F(DaemonTest, WatchersSeeTheSessionUntilItEnds) {
 
 TEST_F(DaemonTest, RefusalsNameWhatIsWrong) {
   start({.scenes = {"hall=gallery:0"}});
-  const auto expect = [](const grpc::Status& status, grpc::StatusCode code, const std::string& word) {
-    EXPECT_EQ(status.error_code(), code) << status.error_message();
-    EXPECT_NE(status.error_message().find(word), std::string::npos) << status.error_message();
-  };
   v1::Ticket ticket;
-  expect(load("hall", "gallery:0"), grpc::StatusCode::ALREADY_EXISTS, "hall");
-  expect(load("a b", "gallery:0"), grpc::StatusCode::INVALID_ARGUMENT, "name");
-  expect(load("city", "city:x"), grpc::StatusCode::INVALID_ARGUMENT, "city:x");
-  expect(load("file", "/etc/passwd"), grpc::StatusCode::INVALID_ARGUMENT, "--scene-root");
-  expect(create("attic", &ticket), grpc::StatusCode::NOT_FOUND, "attic");
-  expect(create("hall", &ticket, 513), grpc::StatusCode::INVALID_ARGUMENT, "513");
-  expect(create("hall", &ticket, 100'000), grpc::StatusCode::INVALID_ARGUMENT, "atlas_width");
-  expect(remove(99), grpc::StatusCode::NOT_FOUND, "99");
+  expect_refused(load("hall", "gallery:0"), grpc::StatusCode::ALREADY_EXISTS, "hall");
+  expect_refused(load("a b", "gallery:0"), grpc::StatusCode::INVALID_ARGUMENT, "name");
+  expect_refused(load("city", "city:x"), grpc::StatusCode::INVALID_ARGUMENT, "city:x");
+  expect_refused(load("file", "/etc/passwd"), grpc::StatusCode::INVALID_ARGUMENT, "--scene-root");
+  expect_refused(create("attic", &ticket), grpc::StatusCode::NOT_FOUND, "attic");
+  expect_refused(create("hall", &ticket, 513), grpc::StatusCode::INVALID_ARGUMENT, "513");
+  expect_refused(create("hall", &ticket, 100'000), grpc::StatusCode::INVALID_ARGUMENT, "atlas_width");
+  expect_refused(remove(99), grpc::StatusCode::NOT_FOUND, "99");
 }
 
 TEST_F(DaemonTest, FilesAreReadBelowTheSceneRootOnly) {
@@ -255,7 +168,8 @@ TEST_F(DaemonTest, TheViewerProgramWritesPictures) {
 
 TEST_F(DaemonTest, ABusyControlPortIsNamed) {
   start();
-  DaemonSettings settings{.control_port = daemon_->control_port(), .meta_port = 0, .media_port = 0};
+  DaemonSettings settings{
+      .control_port = daemon_->control_port(), .meta_port = 0, .media_port = 0, .http_port = 0};
   const auto second = Daemon::start(settings, clock_);
   ASSERT_FALSE(second.ok());
   EXPECT_NE(std::string(second.status().message()).find(std::to_string(settings.control_port)),

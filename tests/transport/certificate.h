@@ -15,7 +15,8 @@ namespace tessera::transport::test {
 
 class Certificate {
  public:
-  explicit Certificate(const std::string& name) {
+  // Valid from an hour ago until `valid_seconds` from now.
+  explicit Certificate(const std::string& name, long valid_seconds = 3600) {
     char pattern[] = "/tmp/tessera-certificate-XXXXXX";
     folder_ = mkdtemp(pattern);
     const std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)> key(EVP_EC_gen("P-256"), &EVP_PKEY_free);
@@ -23,7 +24,7 @@ class Certificate {
     X509_set_version(x509.get(), 2);
     ASN1_INTEGER_set(X509_get_serialNumber(x509.get()), 1);
     X509_gmtime_adj(X509_getm_notBefore(x509.get()), -3600);
-    X509_gmtime_adj(X509_getm_notAfter(x509.get()), 3600);
+    X509_gmtime_adj(X509_getm_notAfter(x509.get()), valid_seconds);
     X509_set_pubkey(x509.get(), key.get());
     X509_NAME* subject = X509_get_subject_name(x509.get());
     X509_NAME_add_entry_by_txt(subject, "CN", MBSTRING_ASC,

@@ -39,15 +39,15 @@ ChildProcess::ChildProcess(const std::string& command_line, const std::string& l
   posix_spawn_file_actions_destroy(&actions);
 }
 
-void ChildProcess::signal(int number) const {
-  kill(pid_, number);
-}
-
 std::optional<int> ChildProcess::exit_code() {
   int status = 0;
   if (!exit_code_ && waitpid(pid_, &status, WNOHANG) == pid_)
     exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return exit_code_;
+}
+
+void ChildProcess::signal(int number) {
+  if (!exit_code()) kill(pid_, number);
 }
 
 ChildProcess::~ChildProcess() {

@@ -19,10 +19,9 @@ class ChildProcess {
   ~ChildProcess();  // kills it if it still runs
   ChildProcess(const ChildProcess&) = delete;
 
-  void signal(int number) const;
-  pid_t pid() const { return pid_; }
   // Its exit code (128 + signal) once it has ended.
   std::optional<int> exit_code();
+  void signal(int number);
 
  private:
   pid_t pid_ = -1;

@@ -85,8 +85,11 @@ void MediaPort::log_dropped() {
   const auto count = drop_log_.event(clock_.now());
   if (!count) return;
   const BindingStats& s = binding_.stats();
-  spdlog::info("media port: dropped {} datagrams (in all: unknown address {}, wrong token {}, malformed {})",
-               *count, s.unknown_address, s.bad_token, s.malformed);
+  log_event(spdlog::level::info, "datagrams dropped",
+            {{"count", *count},
+             {"all_unknown_address", s.unknown_address},
+             {"all_bad_token", s.bad_token},
+             {"all_malformed", s.malformed}});
 }
 
 void MediaPort::handle(const RoutedDatagram& routed, std::span<const uint8_t> datagram, Calls& calls) {
@@ -247,13 +250,6 @@ StatusOr<uint64_t> MediaPort::tap_packets(SessionId session, TapId tap) const {
   return found->second.taps.at(tap)->packets();
 }
 
-StatusOr<StreamIds> MediaPort::stream_ids(SessionId session) const {
-  const std::lock_guard lock(mutex_);
-  const auto found = sessions_.find(session);
-  if (found == sessions_.end()) return absl::NotFoundError(absl::StrCat("there is no session ", session));
-  return found->second.sender->ids();
-}
-
 StatusOr<std::vector<uint8_t>> MediaPort::parameter_sets(SessionId session) const {
   const std::lock_guard lock(mutex_);
   const auto found = sessions_.find(session);
@@ -276,6 +272,12 @@ Status MediaPort::set_rate(SessionId session, double rate_bps) {
 BindingStats MediaPort::binding_stats() const {
   const std::lock_guard lock(mutex_);
   return binding_.stats();
+}
+
+std::optional<StreamIds> MediaPort::stream_ids(SessionId session) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = sessions_.find(session);
+  return found == sessions_.end() ? std::nullopt : std::optional(found->second.sender->ids());
 }
 
 std::optional<RtpSenderStats> MediaPort::sender_stats(SessionId session) const {

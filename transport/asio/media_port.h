@@ -53,8 +53,6 @@ class MediaPort : public std::enable_shared_from_this<MediaPort> {
   void remove_tap(SessionId session, TapId tap);
   // Of video that a tap was sent. NotFound: the tap, or its session, is no more.
   StatusOr<uint64_t> tap_packets(SessionId session, TapId tap) const;
-  // NotFound.
-  StatusOr<StreamIds> stream_ids(SessionId session) const;
   // SPS and PPS (Annex B) of the newest key frame, for make_sdp(). NotFound; FailedPrecondition: there was
   // none yet.
   StatusOr<std::vector<uint8_t>> parameter_sets(SessionId session) const;
@@ -68,6 +66,7 @@ class MediaPort : public std::enable_shared_from_this<MediaPort> {
 
   uint16_t port() const { return socket_->port(); }
   BindingStats binding_stats() const;
+  std::optional<StreamIds> stream_ids(SessionId session) const;
   std::optional<RtpSenderStats> sender_stats(SessionId session) const;
   std::optional<PeerReport> peer_report(SessionId session) const;
   uint64_t dropped_datagrams() const { return socket_->dropped(); }  // the socket's queue was full

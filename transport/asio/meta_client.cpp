@@ -39,6 +39,17 @@ class Attempt : public std::enable_shared_from_this<Attempt> {
     return absl::StrCat("TCP ", settings_.server_address, ":", settings_.server_port);
   }
 
+  // What the failure of a step mostly comes from.
+  std::string advice() const {
+    if (step_ == "connect")
+      return "; does tesserad run there, is this its meta port, does a firewall block it?";
+    if (step_ == "TLS handshake")
+      return "; does the server speak TLS, with a certificate of this name and of an authority that is "
+             "trusted?";
+    return absl::StrCat("; is this the meta port of a tesserad",
+                        settings_.tls ? "?" : ", and does it want TLS?");
+  }
+
   void shake_hands() {
     if (!done_) return;
     step_ = settings_.tls ? "TLS handshake" : "handshake";
@@ -76,10 +87,13 @@ class Attempt : public std::enable_shared_from_this<Attempt> {
 
   void on_closed(const Status& reason) {
     connection_.reset();
-    if (!welcomed_)
-      return fail(reason.ok()
-                      ? absl::UnavailableError(absl::StrCat(where(), ": the server said bye"))
-                      : Status(reason.code(), absl::StrCat(where(), ": ", step_, ": ", reason.message())));
+    if (!welcomed_) {
+      if (reason.ok()) return fail(absl::UnavailableError(absl::StrCat(where(), ": the server said bye")));
+      // Else the server itself says why.
+      const bool none_of_ours = absl::IsUnavailable(reason) || absl::IsInvalidArgument(reason);
+      return fail(Status(reason.code(), absl::StrCat(where(), ": ", step_, ": ", reason.message(),
+                                                     none_of_ours ? advice() : "")));
+    }
     if (events_.on_closed) events_.on_closed(reason);
     events_ = {};
   }
@@ -90,11 +104,11 @@ class Attempt : public std::enable_shared_from_this<Attempt> {
     if (stream_) stream_->close();
     if (connection_) connection_->close(absl::DeadlineExceededError("no welcome within the time for it"));
     fail(absl::DeadlineExceededError(absl::StrCat(where(), ": no answer to ", step_, " for ",
-                                                  to_seconds(settings_.connect_timeout_ns), " s")));
+                                                  to_seconds(settings_.connect_timeout_ns), " s", advice())));
   }
 
   void fail_step(const std::string& why) {
-    fail(absl::UnavailableError(absl::StrCat(where(), ": ", step_, ": ", why)));
+    fail(absl::UnavailableError(absl::StrCat(where(), ": ", step_, ": ", why, advice())));
   }
 
   void fail(Status status) {
