@@ -86,8 +86,6 @@ class FakeRenderer final : public FrameRenderer {
     TESSERA_ASSIGN_OR_RETURN(frame.atlas, encoder_->encode(input.number, view, budget, key_frame));
     return frame;
   }
-  void set_rate(const RateSplit& rate) override { settings_.rate = rate; }
-  const std::string& encoder() const override { return encoder_->choice(); }
 
  private:
   const FakeRendererSettings fake_;
