@@ -193,6 +193,7 @@ StatusOr<std::unique_ptr<Daemon>> Daemon::start(const DaemonSettings& settings, 
 
 Daemon::~Daemon() {
   impl_->set_serving(false);
+  if (impl_->streams) impl_->streams->end_all("the daemon is shutting down");  // calls may take their time
   if (impl_->grpc_server) impl_->grpc_server->Shutdown(std::chrono::system_clock::now() + kDrainTime);
   impl_->grpc_server.reset();
   impl_->pages.set_metrics({});
