@@ -114,14 +114,14 @@ TimeNs first_time(std::span<const FrameRecord> records) {
 }  // namespace
 
 void write_csv(std::span<const FrameRecord> records, std::ostream& out) {
-  out << "session,frame,key_frame,atlas_bytes,meta_bytes,scene_time_ns,pose_sent_ns";
+  out << "session,frame,key_frame,atlas_bytes,meta_bytes,scene_time_ns,pose_time_ns,pose_sent_ns";
   for (const ServerColumn& column : kServerColumns) out << ',' << column.name;
   for (const ClientColumn& column : kClientColumns) out << ',' << column.name;
   for (const auto& [name, duration] : FrameDurations().named()) out << ',' << name << "_ms";
   out << ",sum_ms,end_to_end_ms,overhead_ms\n";
   for (const FrameRecord& r : records) {
     out << r.session << ',' << r.frame << ',' << r.key_frame << ',' << r.atlas_bytes << ',' << r.meta_bytes
-        << ',' << r.scene_time << ',' << r.pose_sent;
+        << ',' << r.scene_time << ',' << r.pose_time << ',' << r.pose_sent;
     for (const ServerColumn& column : kServerColumns) out << ',' << r.server.*column.value;
     for (const ClientColumn& column : kClientColumns) out << ',' << r.client.*column.value;
     const auto d = durations(r);

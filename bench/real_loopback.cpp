@@ -242,7 +242,7 @@ Status RealLoopback::score_picture(const json& saved, TruthSource& truth, const 
   error.add(comparison.error);
   DisplayRecord display{.time_ns = from_seconds(pictures.index / s_.fps),
                         .frame = frame,
-                        .age_ms = to_ms(displayed - record->pose_sent),
+                        .age_ms = to_ms(displayed - record->pose_time),
                         .atlas_bytes = record->atlas_bytes,
                         .meta_bytes = record->meta_bytes};
   display.mssim["tessera"] = comparison.error.mssim;

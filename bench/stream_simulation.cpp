@@ -169,6 +169,7 @@ struct StreamSimulation::Impl {
     TESSERA_ASSIGN_OR_RETURN(std::vector<Packet> packets, streamer.serve(request));
     records[number] = {.frame = number,
                        .scene_time = request.scene_time_ns,
+                       .pose_time = poses.back().time_ns,
                        .pose_sent = poses.back().time_ns,
                        .server = {.pose_received = *newest_pose_received,
                                   .due = now,

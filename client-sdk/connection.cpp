@@ -1,5 +1,6 @@
 #include "client-sdk/connection.h"
 
+#include <algorithm>
 #include <atomic>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
@@ -25,6 +26,8 @@ using transport::FrameType;
 constexpr DurationNs kPingIntervalNs = kNsPerSecond, kFirstPingIntervalNs = 50 * kNsPerMs;
 constexpr uint32_t kFirstPings = 8;
 constexpr size_t kMaxUndecodedBytes = 32u << 20;
+// However long the steps before took, a few hellos are tried.
+constexpr DurationNs kMinMediaTimeoutNs = kNsPerSecond;
 
 }  // namespace
 
@@ -51,6 +54,7 @@ struct Connection::Impl {
 
   const ConnectionSettings settings;
   const Clock& clock;
+  const TimeNs give_up = clock.now() + settings.connect_timeout_ns;  // on connecting
   std::unique_ptr<ClientCore> core;
   asio::io_context io{1};  // run by one thread, which never waits for a decoder
   asio::executor_work_guard<asio::io_context::executor_type> work;
@@ -123,7 +127,7 @@ Status Connection::Impl::open_media() {
                                                 .server_port = welcome.media_port,
                                                 .token = settings.token,
                                                 .srtp = welcome.srtp,
-                                                .answer_timeout_ns = settings.connect_timeout_ns};
+                                                .bind_timeout_ns = std::max(give_up - clock.now(), kMinMediaTimeoutNs)};
   media_settings.receiver.payload_type = welcome.stream.payload_type;
   media_settings.receiver.rtx_payload_type = welcome.stream.rtx_payload_type;
   media_settings.receiver.ssrc = welcome.stream.ssrc;
@@ -273,7 +277,7 @@ Connection::~Connection() {
 }
 
 void Connection::send_pose(const TimedPose& pose) {
-  const transport::SequencedPose sequenced{impl_->pose_sequence++, pose};
+  const transport::SequencedPose sequenced{impl_->pose_sequence++, pose, impl_->clock.now()};
   if (!impl_->media->send_pose(sequenced))
     (void)impl_->meta->send(FrameType::pose, transport::encode(sequenced));
 }

@@ -68,6 +68,7 @@ void write(const FrameRecord& record, v1::FrameRecord& out) {
   out.set_atlas_bytes(record.atlas_bytes);
   out.set_meta_bytes(record.meta_bytes);
   out.set_scene_time_ns(record.scene_time);
+  out.set_pose_time_ns(record.pose_time);
   out.set_pose_sent_ns(record.pose_sent);
   write(record.server, *out.mutable_server());
   write(record.client, *out.mutable_client());
@@ -81,6 +82,7 @@ FrameRecord read(const v1::FrameRecord& message) {
   record.atlas_bytes = message.atlas_bytes();
   record.meta_bytes = message.meta_bytes();
   record.scene_time = message.scene_time_ns();
+  record.pose_time = message.pose_time_ns();
   record.pose_sent = message.pose_sent_ns();
   record.server = read(message.server());
   record.client = read(message.client());

@@ -34,7 +34,8 @@ void add_options(CLI::App& app, DaemonSettings& s, LogSettings& log) {
   add("Sessions", "max-atlas-mtexels", s.max_atlas_mtexels,
       "2^20 texels of all sessions' atlases together; an atlas of 2048x1024 has 2")
       ->check(CLI::Range(1, 65536));
-  add("Sessions", "max-watchers", s.max_watchers, "WatchSession and ForwardStream calls at a time")
+  add("Sessions", "max-watchers", s.max_watchers,
+      "WatchSession, WatchFrames and ForwardStream calls at a time")
       ->check(CLI::Range(1, 1024));
   // An empty text stands for none, as CLI11 writes it.
   app.add_option_function<std::vector<std::string>>(

@@ -90,6 +90,7 @@ void StreamedSession::on_pose(const transport::SequencedPose& pose) {
   if (!poses_.empty() && pose.timed.time_ns <= poses_.back().time_ns) return;
   std::erase_if(poses_, [&](const TimedPose& p) { return p.time_ns < pose.timed.time_ns - kHistoryNs; });
   poses_.push_back(pose.timed);
+  newest_pose_sent_ns_ = pose.sent_ns;
   newest_pose_received_ns_ = clock_.now();
 }
 
@@ -124,8 +125,8 @@ Status StreamedSession::on_timing(std::span<const uint8_t> payload) {
     FrameRecord& record = sent.mapped();
     record.client = times;
     // Both times are the client's.
-    if (times.displayed > record.pose_sent)
-      stats_.round_trip_ns = std::min(times.displayed - record.pose_sent, kMaxRoundTripNs);
+    if (times.displayed > record.pose_time)
+      stats_.round_trip_ns = std::min(times.displayed - record.pose_time, kMaxRoundTripNs);
     if (records_.size() == kMaxRecords) records_.pop_front(), ++first_record_;
     records_.push_back(record);
   }
@@ -180,6 +181,7 @@ StreamedSession::Work StreamedSession::take_work() {
           .connection = connection_,
           .client_view = client_view_,
           .round_trip_ns = stats_.round_trip_ns,
+          .pose_sent_ns = newest_pose_sent_ns_,
           .pose_received_ns = newest_pose_received_ns_,
           .due_ns = due_ns_,
           .key_frame = std::exchange(key_frame_wanted_, false),
@@ -239,7 +241,7 @@ Status StreamedSession::render() {
     ++stats_.frames_skipped;
     return absl::OkStatus();
   }
-  FrameRecord record{.session = id_, .frame = next_frame_++};
+  FrameRecord record{.session = id_, .frame = next_frame_++, .pose_sent = work.pose_sent_ns};
   record.server = {.pose_received = work.pose_received_ns, .due = work.due_ns, .render_begin = clock_.now()};
   record.scene_time = record.server.render_begin;
   TESSERA_ASSIGN_OR_RETURN(const Frame frame, renderer_->render({.number = record.frame,
@@ -263,7 +265,7 @@ Status StreamedSession::render() {
 
 Status StreamedSession::send(const Work& work, const Frame& frame, FrameRecord record) {
   const StageTimes& times = frame.stats.times;
-  record.pose_sent = frame.pose.time_ns;
+  record.pose_time = frame.pose.time_ns;
   record.key_frame = frame.atlas.key_frame;
   record.atlas_bytes = frame.atlas.bytes.size();
   record.meta_bytes = frame.meta.size();

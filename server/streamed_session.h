@@ -82,7 +82,7 @@ class StreamedSession {
     std::shared_ptr<transport::MetaConnection> connection;
     View client_view;
     DurationNs round_trip_ns = 0;
-    TimeNs pose_received_ns = 0, due_ns = 0;
+    TimeNs pose_sent_ns = 0, pose_received_ns = 0, due_ns = 0;
     bool key_frame = false;
     RateSplit rate;
   };
@@ -109,7 +109,7 @@ class StreamedSession {
   std::shared_ptr<transport::MetaConnection> connection_;
   View client_view_;
   std::vector<TimedPose> poses_;  // on the client's clock
-  TimeNs newest_pose_received_ns_ = 0;
+  TimeNs newest_pose_sent_ns_ = 0, newest_pose_received_ns_ = 0;
   std::map<FrameNumber, FrameRecord> under_way_;  // sent, and nothing heard of it yet
   std::deque<FrameRecord> records_;
   uint64_t first_record_ = 0;  // number of records_.front()

@@ -1,4 +1,4 @@
-// A pose on the wire: the same 52 bytes in a datagram and in a TCP frame (docs/protocol.md).
+// A pose on the wire: the same 60 bytes in a datagram and in a TCP frame (docs/protocol.md).
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,8 @@ namespace tessera::transport {
 
 struct SequencedPose {
   uint32_t sequence = 0;  // counts poses on both ways together; wraps around
-  TimedPose timed;        // time on the client's clock
+  TimedPose timed;        // for when it is, on the client's clock; it may be a prediction
+  TimeNs sent_ns = 0;     // when it was sent, on the same clock
 };
 
 constexpr double kMaxPositionM = 1e9;

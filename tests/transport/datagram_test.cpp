@@ -14,7 +14,7 @@ using test::Bytes;
 using test::from_hex;
 
 SequencedPose some_pose() {
-  SequencedPose pose{0x01020304, {1'500'000'000, {{1.5, -2.0, 0.25}, {1, 0, 0, 0}}}};
+  SequencedPose pose{0x01020304, {1'500'000'000, {{1.5, -2.0, 0.25}, {1, 0, 0, 0}}}, 1'500'000'001};
   pose.timed.pose.orientation = dquat(0.5, 0.5, -0.5, 0.5);  // w, x, y, z
   return pose;
 }
@@ -23,7 +23,7 @@ SequencedPose some_pose() {
 constexpr const char* kHello = "04010000 000102030405060708090a0b0c0d0e0f 1122334455667788";
 constexpr const char* kAnswer = "05010000 1122334455667788";
 constexpr const char* kPose =
-    "06010000 01020304 0000000059682f00 3ff8000000000000 c000000000000000 3fd0000000000000"
+    "06010000 01020304 0000000059682f00 0000000059682f01 3ff8000000000000 c000000000000000 3fd0000000000000"
     "3f000000 bf000000 3f000000 3f000000";
 
 SessionToken counting_token() {
@@ -44,6 +44,7 @@ TEST(Datagram, KnownBytesBothWays) {
   ASSERT_TRUE(pose.ok()) << pose.status();
   EXPECT_EQ(pose->sequence, some_pose().sequence);
   EXPECT_EQ(pose->timed.time_ns, some_pose().timed.time_ns);
+  EXPECT_EQ(pose->sent_ns, some_pose().sent_ns);
   EXPECT_TRUE(pose->timed.pose == some_pose().timed.pose);
 }
 
