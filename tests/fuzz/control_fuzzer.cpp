@@ -1,4 +1,6 @@
 // Any bytes as the requests of tessera.v1.Control, to the service with a stream server, without a device.
+#include <google/protobuf/stubs/logging.h>
+
 #include <cstdlib>
 #include <memory>
 #include <string>
@@ -23,6 +25,7 @@ class Bench {
  public:
   Bench() {
     init_logging("off");
+    google::protobuf::SetLogHandler(nullptr);
     service_.open();
     renew();
   }

@@ -139,6 +139,14 @@ TEST_F(Process, ASignalUnderLoadEndsItAndClientsAreTold) {
   for (std::thread& client : clients) client.join();
 }
 
+// R13: whoever reaches the control port must not fill the log.
+TEST_F(Process, ARequestThatCannotBeReadLeavesNoLine) {
+  ASSERT_NO_FATAL_FAILURE(serve());
+  const size_t before = log().size();
+  EXPECT_FALSE(load("\xff", "gallery:0").ok());
+  EXPECT_EQ(log().size(), before) << log();
+}
+
 // R13: nobody says bye, and nobody else notices.
 TEST_F(Process, AKilledViewerMayComeAgainWithItsTicket) {
   ASSERT_NO_FATAL_FAILURE(serve());
