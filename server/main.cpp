@@ -75,7 +75,8 @@ int serve(const server::DaemonSettings& settings) {
   waits_for_signal.join();
   std::thread([] {
     std::this_thread::sleep_for(kShutdownTime);
-    log_event(spdlog::level::warn, "shutdown cut short", {{"reason", "a call still runs"}});
+    log_event(spdlog::level::warn, "shutdown cut short",
+              {{"seconds", std::chrono::duration<double>(kShutdownTime).count()}});
     std::_Exit(kOk);
   }).detach();  // nothing stops a call that is loading a scene
   daemon->reset();
