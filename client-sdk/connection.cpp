@@ -124,11 +124,12 @@ Status Connection::Impl::open_meta() {
 }
 
 Status Connection::Impl::open_media() {
-  transport::MediaClientSettings media_settings{.server_address = settings.server_address,
-                                                .server_port = welcome.media_port,
-                                                .token = settings.token,
-                                                .srtp = welcome.srtp,
-                                                .bind_timeout_ns = std::max(give_up - clock.now(), kMinMediaTimeoutNs)};
+  transport::MediaClientSettings media_settings{
+      .server_address = settings.server_address,
+      .server_port = welcome.media_port,
+      .token = settings.token,
+      .srtp = welcome.srtp,
+      .bind_timeout_ns = std::max(give_up - clock.now(), kMinMediaTimeoutNs)};
   media_settings.receiver.payload_type = welcome.stream.payload_type;
   media_settings.receiver.rtx_payload_type = welcome.stream.rtx_payload_type;
   media_settings.receiver.ssrc = welcome.stream.ssrc;
