@@ -80,6 +80,7 @@ void StreamedSession::on_closed(const Status& reason) {
   under_way_.clear();
   admitted_ = bound_ = false;
   restart_ = true;  // the next client knows nothing
+  prepared_ = false;
   stats_.ended = reason;
 }
 
@@ -176,7 +177,7 @@ void StreamedSession::close(const Status& reason) {
 
 bool StreamedSession::ready() const {
   const std::lock_guard lock(mutex_);
-  return connection_ && bound_ && !poses_.empty();
+  return connection_ && (!prepared_ || (bound_ && !poses_.empty()));
 }
 
 TimeNs StreamedSession::due_ns() const {
@@ -194,6 +195,7 @@ StreamedSession::Work StreamedSession::take_work() {
           .pose_sent_ns = newest_pose_sent_ns_,
           .pose_received_ns = newest_pose_received_ns_,
           .due_ns = due_ns_,
+          .bound = bound_,
           .key_frame = std::exchange(key_frame_wanted_, false),
           .rate = rate_};
 }
@@ -232,12 +234,11 @@ RateSplit StreamedSession::rate() const {
 
 Status StreamedSession::render() {
   const Work work = take_work();
-  if (!work.connection || work.poses.empty()) return absl::OkStatus();
-  if (!renderer_) {
-    SessionSettings settings = settings_;
-    settings.client_view = work.client_view;
-    settings.rate = work.rate;
-    TESSERA_ASSIGN_OR_RETURN(renderer_, make_renderer_(settings));
+  if (!work.connection) return absl::OkStatus();
+  if (!renderer_) TESSERA_RETURN_IF_ERROR(prepare(work));
+  if (!work.bound || work.poses.empty()) {
+    if (work.key_frame) on_key_frame_request();
+    return absl::OkStatus();
   }
   renderer_->set_rate(work.rate);
   const StatusOr<double> budget =
@@ -271,6 +272,16 @@ Status StreamedSession::render() {
              {"render_ms", frame.stats.times.total_ms()}});
   if (on_rendered_) on_rendered_(frame.stats);
   return send(work, frame, record);
+}
+
+Status StreamedSession::prepare(const Work& work) {
+  SessionSettings settings = settings_;
+  settings.client_view = work.client_view;
+  settings.rate = work.rate;
+  TESSERA_ASSIGN_OR_RETURN(renderer_, make_renderer_(settings));
+  const std::lock_guard lock(mutex_);
+  prepared_ = !restart_;
+  return absl::OkStatus();
 }
 
 Status StreamedSession::send(const Work& work, const Frame& frame, FrameRecord record) {

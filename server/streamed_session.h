@@ -56,14 +56,16 @@ class StreamedSession {
   // Tells the client, also one that is just connecting; it sends nothing any more.
   void close(const Status& reason);
 
-  // Both connections stand and a pose is there.
+  // There is something to do: a renderer to make for a client that has come, or a frame, as both connections
+  // stand and a pose is there.
   bool ready() const;
   // When its next frame should start, on the server's clock.
   TimeNs due_ns() const;
   // From the next frame on.
   Status set_rate(double bitrate_bps, double frames_per_second);
   RateSplit rate() const;
-  // Renders and sends a frame, or skips it while the network is behind. An error ends the session.
+  // Makes the renderer; renders and sends a frame, or skips it while the network is behind. An error ends the
+  // session.
   Status render();
   // Lets go of all that lies on the device; nothing is rendered afterwards.
   void release();
@@ -81,13 +83,14 @@ class StreamedSession {
     View client_view;
     DurationNs round_trip_ns = 0;
     TimeNs pose_sent_ns = 0, pose_received_ns = 0, due_ns = 0;
-    bool key_frame = false;
+    bool bound = false, key_frame = false;
     RateSplit rate;
   };
   Status on_unbound();
   Status on_timing(std::span<const uint8_t> payload);
   Status answer_ping(std::span<const uint8_t> payload);
   Work take_work();
+  Status prepare(const Work& work);
   Status send(const Work& work, const Frame& frame, FrameRecord record);
   void put_off();
   void count(const Frame& frame);
@@ -112,7 +115,7 @@ class StreamedSession {
   std::map<FrameNumber, FrameRecord> under_way_;  // sent, and nothing heard of it yet
   std::deque<FrameRecord> records_;
   uint64_t first_record_ = 0;  // number of records_.front()
-  bool admitted_ = false, bound_ = false, key_frame_wanted_ = false, restart_ = false;
+  bool admitted_ = false, bound_ = false, key_frame_wanted_ = false, restart_ = false, prepared_ = false;
   std::optional<Status> closed_;  // why
   TimeNs due_ns_ = 0;
   RateSplit rate_;

@@ -124,6 +124,28 @@ TEST_F(SessionTest, EqualInputsGiveEqualBytes) {
   EXPECT_EQ(run(), run());
 }
 
+// What a frame costs must not grow with how late it is, or a server that falls behind falls ever further.
+TEST_F(SessionTest, MoreLatencyMeansWiderSpacedViewsUpToTheHorizon) {
+  auto quad = make_quad();
+  quad->index_instances();
+  auto session = must(Session::create(must(SharedScene::create(device(), quad)), small_settings()));
+  const std::vector<TimedPose> poses = {{0, Pose{}}, {from_ms(33), Pose{.position = {0.1, 0, 0}}}};
+  size_t before = 0;
+  for (FrameNumber n = 0; const double round_trip_ms : {20, 100, 180, 300, 1000}) {
+    FrameInput moving = input(n++, poses);
+    moving.round_trip_ns = from_ms(round_trip_ms);
+    must(session->render(moving));
+    EXPECT_LE(session->views().size(), 8u) << round_trip_ms;
+    EXPECT_GE(session->views().size(), before) << round_trip_ms;
+    before = session->views().size();
+    ASSERT_EQ(session->view_times().size(), before);
+    const TimeNs end = poses.back().time_ns + session->horizon_ns();
+    EXPECT_LE(session->view_times().back(), end) << round_trip_ms;
+    EXPECT_GE(session->view_times().back(), end - kNsPerMs) << round_trip_ms;
+  }
+  EXPECT_GT(before, 4u);
+}
+
 TEST_F(SessionTest, RefusesAFrameWithoutPoses) {
   auto quad = make_quad();
   quad->index_instances();
