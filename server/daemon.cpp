@@ -191,8 +191,12 @@ StatusOr<std::unique_ptr<Daemon>> Daemon::start(const DaemonSettings& settings, 
   return daemon;
 }
 
-Daemon::~Daemon() {
+void Daemon::drain() {
   impl_->set_serving(false);
+}
+
+Daemon::~Daemon() {
+  drain();
   if (impl_->grpc_server) impl_->grpc_server->Shutdown(std::chrono::system_clock::now() + kDrainTime);
   impl_->grpc_server.reset();
   impl_->pages.set_metrics({});

@@ -46,8 +46,12 @@ class Daemon {
   // Serves once it returns; /healthz and /readyz answer from its first moments on. `clock` outlives the
   // daemon.
   static StatusOr<std::unique_ptr<Daemon>> start(const DaemonSettings& settings, const Clock& clock);
-  // Lets nothing new in, tells the clients, and ends within a few seconds.
+  // Drains, tells the clients, and ends within a few seconds.
   ~Daemon();
+
+  // Lets nothing new in: calls that would are UNAVAILABLE, /readyz is 503, watchers are sent home. Sessions
+  // go on.
+  void drain();
 
   uint16_t control_port() const;
   uint16_t meta_port() const;

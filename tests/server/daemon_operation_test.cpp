@@ -77,6 +77,24 @@ TEST_F(Operation, NothingNewIsLetInBeforeAndAfterItServes) {
   expect_refused(control.LoadScene(nullptr, &load, &scene), StatusCode::UNAVAILABLE, "shutting down");
 }
 
+// RELIABILITY R14, over sockets.
+TEST_F(Operation, ADrainLetsNothingNewInAndKeepsWhatRuns) {
+  start({.scenes = {"hall=gallery:0"}});
+  v1::Ticket ticket, second;
+  ASSERT_TRUE(create("hall", &ticket).ok());
+  auto client = connect(ticket);
+  ASSERT_TRUE(client.ok()) << client.status();
+  EXPECT_THAT(test::get(daemon_->http_port(), "/readyz"), StartsWith("HTTP/1.1 200 "));
+  daemon_->drain();
+  expect_refused(create("hall", &second), StatusCode::UNAVAILABLE, "shutting down");
+  expect_refused(load("second", "gallery:0"), StatusCode::UNAVAILABLE, "shutting down");
+  EXPECT_THAT(test::get(daemon_->http_port(), "/readyz"),
+              testing::AllOf(StartsWith("HTTP/1.1 503 "), HasSubstr("draining")));
+  EXPECT_THAT(test::get(daemon_->http_port(), "/healthz"), StartsWith("HTTP/1.1 200 "));
+  EXPECT_NE(first_pair(**client), nullptr) << (*client)->status();
+  EXPECT_TRUE(get(ticket.session()).connected());
+}
+
 TEST_F(Operation, ServerInfoNamesDeviceEncoderAndLimits) {
   start({.max_sessions = 5, .max_atlas_mtexels = 6, .max_scene_mib = 700, .max_watchers = 8});
   grpc::ClientContext context;
