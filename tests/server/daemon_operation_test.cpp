@@ -246,7 +246,9 @@ TEST_F(Operation, DoctorNamesEachFaultAndNoOther) {
               testing::ElementsAre("control port", "meta port", "media port", "http port"));
   s = free;
   s.address = "0.0.0.0";
-  EXPECT_THAT(failed(examine(s)), testing::ElementsAre("configuration"));
+  EXPECT_THAT(failed(examine(s)), testing::ElementsAre("configuration", "control token"));
+  s.insecure = true;
+  EXPECT_THAT(failed(examine(s)), testing::IsEmpty());
   s = free;
   s.scenes = {"a=/no/such/file.glb", "b"};
   s.scene_root = "/no/such/folder";
@@ -261,7 +263,7 @@ TEST_F(Operation, DoctorNamesEachFaultAndNoOther) {
 
 TEST_F(Operation, DoctorReadsCertificates) {
   const transport::test::Certificate good("localhost"), other("localhost"), old("localhost", -60);
-  DaemonSettings s{.address = "0.0.0.0", .control_port = 0, .meta_port = 0, .media_port = 0, .http_port = 0};
+  DaemonSettings s{.control_port = 0, .meta_port = 0, .media_port = 0, .http_port = 0};
   s.tls_certificate = good.certificate_file();
   EXPECT_THAT(failed(examine(s)), testing::ElementsAre("configuration")) << "no key";
   s.tls_key = other.key_file();

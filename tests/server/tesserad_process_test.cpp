@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -114,11 +115,20 @@ TEST_F(Process, JsonLogsAreJsonFromTheFirstLineToTheLast) {
 
 // Neither at the most talkative level, nor of clients that are refused.
 TEST_F(Process, TokensAreNotLogged) {
-  run("--log trace --scene hall=gallery:0" + kFreePorts);
+  const std::string control_token = "controls-0123456789";
+  const std::string token_file = folder_.file("token");
+  transport::test::write_file(token_file, control_token);
+  std::filesystem::permissions(token_file, std::filesystem::perms::owner_read);
+  run("--log trace --scene hall=gallery:0 --control-token-file " + token_file + kFreePorts);
   ASSERT_TRUE(logged("serving")) << log();
-  control_ = v1::Control::NewStub(grpc::CreateChannel(absl::StrCat("127.0.0.1:", port_in_log("control_port")),
-                                                      grpc::InsecureChannelCredentials()));
+  const std::string where = absl::StrCat("127.0.0.1:", port_in_log("control_port"));
+  const auto show = [&](const std::string& token) {
+    control_ = v1::Control::NewStub(control_channel(where, grpc::InsecureChannelCredentials(), token));
+  };
   v1::Ticket ticket;
+  show(control_token + "x");
+  expect_refused(create("hall", &ticket), grpc::StatusCode::UNAUTHENTICATED, "wrong control token");
+  show(control_token);
   ASSERT_TRUE(create("hall", &ticket).ok());
   const std::string right = ticket.token();
   auto client = connect(ticket);
@@ -129,7 +139,8 @@ TEST_F(Process, TokensAreNotLogged) {
   child_->signal(SIGTERM);
   EXPECT_EQ(exit_code(), 0);
   std::string text = log();
-  EXPECT_THAT(text, HasSubstr("client connected"));
+  EXPECT_THAT(text, AllOf(HasSubstr("client connected"), HasSubstr("control calls refused")));
+  EXPECT_EQ(text.find("controls-"), text.npos);
   const std::string start = right.substr(0, 8);  // of both tokens
   EXPECT_EQ(text.find(start), text.npos);
   EXPECT_EQ(text.find(absl::Base64Escape(right).substr(0, 8)), text.npos);
@@ -142,8 +153,8 @@ TEST_F(Process, WrongUsageIsTwo) {
   EXPECT_EQ(exit_code(), 2);
   run("--max-sessions 0");
   EXPECT_EQ(exit_code(), 2);
-  for (const char* wrong :
-       {"--address 0.0.0.0", "--address localhost", "--scene hall", "--tls-key key.pem"}) {
+  for (const char* wrong : {"--address 0.0.0.0", "--address localhost", "--scene hall", "--tls-key key.pem",
+                            "--control-token-file /no/such/file"}) {
     run(wrong + kFreePorts);
     EXPECT_EQ(exit_code(), 2) << wrong;
     run(std::string("--check-config ") + wrong);
