@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "absl/strings/escaping.h"
+#include "base/frame_record.h"
 #include "base/status.h"
 #include "bench/image_io.h"
 #include "bench/report_plots.h"
@@ -103,6 +104,7 @@ constexpr Column kColumns[] = {{"MSSIM", "mssim", 4},
                                {"stale", "frames_stale", 0},
                                {"lost", "frames_lost", 0},
                                {"violations", "violations", 0},
+                               {"server frames/s", "server_fps", 1},
                                {"server ms", "server_ms", 1},
                                {"client ms", "client_ms", 1}};
 
@@ -136,6 +138,32 @@ std::string rows_table(const json& rows) {
                     escape(row["note"].get<std::string>()), "</p>\n");
   }
   return html;
+}
+
+// Of runs by the real clock: nothing else has durations that were measured.
+std::string latency_table(const json& run) {
+  if (run.at("settings").value("clock", "") != "real") return "";
+  std::vector<std::string> names;
+  for (const auto& [name, duration] : FrameDurations().named()) names.emplace_back(name);
+  std::string html =
+      "<h3>Latency: p50 / p99 in ms</h3>\n<div class=\"scroll\"><table><tr><th>session</th>";
+  for (const std::string& name : names) absl::StrAppend(&html, "<th>", name, "</th>");
+  html += "<th>end to end</th><th>overhead</th><th>largest tiling error</th></tr>\n";
+  const auto cell = [](const json& of, const std::string& name) {
+    const json p = of.value(name, json::object());
+    return absl::StrCat("<td>", number(p, "p50", 2), " / ", number(p, "p99", 2), "</td>");
+  };
+  for (const json& row : run.at("rows")) {
+    absl::StrAppend(&html, "<tr><td>", row.value("session", 0), "</td>");
+    const json durations = row.value("durations_ms", json::object());
+    for (const std::string& name : names) html += cell(durations, name);
+    absl::StrAppend(&html, cell(row, "end_to_end_ms"), cell(row, "overhead_ms"), "<td>",
+                    number(row, "tiling_error_ms_max", 3), "</td></tr>\n");
+  }
+  return html +
+         "</table></div>\n<p class=\"soft\">Of the two decodings the one that ends last counts in the total. "
+         "Overhead is what is neither rendering, coding, drawing, the network, nor waiting for the next frame's "
+         "time.</p>\n";
 }
 
 std::string split_table(const json& split) {
@@ -223,8 +251,9 @@ std::string title_of(const json& run) {
   const json& s = run.at("settings");
   return absl::StrCat(std::filesystem::path(s.at("scene").get<std::string>()).stem().string(), ", ",
                       s.at("size").get<std::string>(), ", atlas ", s.at("atlas").get<std::string>(), ", ",
-                      number(s, "bitrate-mbps", 1), " Mbit/s, ", number(s, "delay-ms", 0),
-                      " ms each way, codec ", s.at("codec").get<std::string>());
+                      number(s, "bitrate-mbps", 1), " Mbit/s, ",
+                      s.value("clock", "") == "real" ? "real clock" : number(s, "delay-ms", 0) + " ms each way",
+                      ", codec ", s.at("codec").get<std::string>());
 }
 
 std::string run_html(const std::filesystem::path& folder, const json& run) {
@@ -235,6 +264,7 @@ std::string run_html(const std::filesystem::path& folder, const json& run) {
       escape(device.value("name", std::string())), " (", escape(device.value("driver", std::string())),
       ") · ", escape(machine.value("cpu", std::string())), ", ", machine.value("cores", 0), " cores</p>\n");
   html += rows_table(run.at("rows"));
+  html += latency_table(run);
   for (const json& note : run.value("notes", json::array())) {
     absl::StrAppend(&html, "<p class=\"soft\">", escape(note.get<std::string>()), "</p>\n");
   }

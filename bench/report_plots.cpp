@@ -11,6 +11,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "base/frame_record.h"
 #include "base/status.h"
 #include "bench/file_io.h"
 #include "bench/temporary_folder.h"
@@ -124,7 +125,9 @@ Series bitrate_series(const json& frames, const std::string& name, const char* f
 std::string durations_script(const json& durations) {
   if (durations.empty()) return "";
   std::string block = "$d0 << EOD\n";
-  for (const auto& [name, p] : durations.items()) {
+  for (const auto& [key, unused] : FrameDurations().named()) {
+    const std::string name(key);
+    const json p = durations.value(name, json::object());
     absl::StrAppendFormat(&block, "\"%s\" %.6g %.6g %.6g\n", name, p.value("p50", 0.0), p.value("p95", 0.0),
                           p.value("p99", 0.0));
   }

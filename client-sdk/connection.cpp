@@ -1,5 +1,6 @@
 #include "client-sdk/connection.h"
 
+#include <algorithm>
 #include <atomic>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
@@ -24,7 +25,12 @@ using transport::FrameType;
 // The first pings come fast, for an offset of the clocks before the first picture.
 constexpr DurationNs kPingIntervalNs = kNsPerSecond, kFirstPingIntervalNs = 50 * kNsPerMs;
 constexpr uint32_t kFirstPings = 8;
-constexpr size_t kMaxUndecodedBytes = 32u << 20;
+// That wait for the decoder. Video beyond it is dropped up to the next key frame, so that a slow decoder lowers
+// the rate and not the age of what is shown; metas, which cannot be missed, end the connection.
+constexpr size_t kMaxUndecodedAtlases = 4;
+constexpr size_t kMaxUndecodedMetaBytes = 32u << 20;
+// However long the steps before took, a few hellos are tried.
+constexpr DurationNs kMinMediaTimeoutNs = kNsPerSecond;
 
 }  // namespace
 
@@ -41,9 +47,8 @@ struct Connection::Impl {
   void on_access_unit(transport::ReceivedFrame frame);
   void decode_meta(const std::vector<uint8_t>& packet, TimeNs complete);
   void decode_atlas(const transport::ReceivedFrame& frame);
-  // False: the decoder is too far behind.
-  bool reserve(size_t bytes);
-  void report(FrameNumber frame, TimeNs draw_begin, TimeNs displayed);
+  void note_drawn(FrameNumber frame, TimeNs begin);
+  void report(FrameNumber frame, TimeNs displayed);
   void request_key_frame();
   void ping();
   void end(const Status& reason);
@@ -51,6 +56,7 @@ struct Connection::Impl {
 
   const ConnectionSettings settings;
   const Clock& clock;
+  const TimeNs give_up = clock.now() + settings.connect_timeout_ns;  // on connecting
   std::unique_ptr<ClientCore> core;
   asio::io_context io{1};  // run by one thread, which never waits for a decoder
   asio::executor_work_guard<asio::io_context::executor_type> work;
@@ -63,8 +69,7 @@ struct Connection::Impl {
   std::atomic<uint32_t> pose_sequence = 0;
   uint32_t ping_id = 0;  // the receiving thread's, as is
   bool closing = false;
-  TimeNs draw_begin = 0;                   // the drawing thread's
-  std::atomic<size_t> undecoded_bytes{0};  // that wait for the decoder
+  std::atomic<size_t> undecoded_atlases{0}, undecoded_meta_bytes{0};
   FrameTimes times;                        // the decoder's, with the core's receiving side
 
   mutable std::mutex mutex;  // of all below
@@ -119,11 +124,12 @@ Status Connection::Impl::open_meta() {
 }
 
 Status Connection::Impl::open_media() {
-  transport::MediaClientSettings media_settings{.server_address = settings.server_address,
-                                                .server_port = welcome.media_port,
-                                                .token = settings.token,
-                                                .srtp = welcome.srtp,
-                                                .answer_timeout_ns = settings.connect_timeout_ns};
+  transport::MediaClientSettings media_settings{
+      .server_address = settings.server_address,
+      .server_port = welcome.media_port,
+      .token = settings.token,
+      .srtp = welcome.srtp,
+      .bind_timeout_ns = std::max(give_up - clock.now(), kMinMediaTimeoutNs)};
   media_settings.receiver.payload_type = welcome.stream.payload_type;
   media_settings.receiver.rtx_payload_type = welcome.stream.rtx_payload_type;
   media_settings.receiver.ssrc = welcome.stream.ssrc;
@@ -155,20 +161,15 @@ Status Connection::Impl::on_frame(FrameType type, std::span<const uint8_t> paylo
       absl::StrCat("frame of type ", static_cast<int>(type), " is not the server's to send"));
 }
 
-bool Connection::Impl::reserve(size_t bytes) {
-  if (undecoded_bytes + bytes > kMaxUndecodedBytes) return false;
-  undecoded_bytes += bytes;
-  return true;
-}
-
 Status Connection::Impl::on_meta(std::span<const uint8_t> packet) {
-  if (!reserve(packet.size())) {
+  if (undecoded_meta_bytes + packet.size() > kMaxUndecodedMetaBytes) {
     return absl::ResourceExhaustedError(
-        absl::StrCat("this client decodes too slowly: ", kMaxUndecodedBytes >> 20, " MiB wait"));
+        absl::StrCat("this client decodes too slowly: ", kMaxUndecodedMetaBytes >> 20, " MiB of geometry wait"));
   }
+  undecoded_meta_bytes += packet.size();
   asio::post(decoder, [this, complete = clock.now(), copy = std::vector(packet.begin(), packet.end())] {
     decode_meta(copy, complete);
-    undecoded_bytes -= copy.size();
+    undecoded_meta_bytes -= copy.size();
   });
   return absl::OkStatus();
 }
@@ -189,10 +190,11 @@ void Connection::Impl::decode_meta(const std::vector<uint8_t>& packet, TimeNs co
 
 void Connection::Impl::on_access_unit(transport::ReceivedFrame frame) {
   // The decoder sees by the units' references that one is missing.
-  if (!frame.complete || !reserve(frame.access_unit.size())) return request_key_frame();
+  if (!frame.complete || undecoded_atlases >= kMaxUndecodedAtlases) return request_key_frame();
+  ++undecoded_atlases;
   asio::post(decoder, [this, frame = std::move(frame)] {
     decode_atlas(frame);
-    undecoded_bytes -= frame.access_unit.size();
+    --undecoded_atlases;
   });
 }
 
@@ -220,7 +222,13 @@ void Connection::Impl::request_key_frame() {
   if (to) to->request_key_frame();
 }
 
-void Connection::Impl::report(FrameNumber frame, TimeNs drawn, TimeNs displayed) {
+// A drawing thread may take a pair before its decoder has looked at the clock.
+void Connection::Impl::note_drawn(FrameNumber frame, TimeNs begin) {
+  ClientFrameTimes& t = times.of(frame);
+  t.draw_begin = std::max({begin, t.atlas_decoded, t.meta_decoded});
+}
+
+void Connection::Impl::report(FrameNumber frame, TimeNs displayed) {
   std::vector<ClientFrameTimes> taken = times.take_up_to(frame);
   std::optional<DurationNs> clock_offset, round_trip;
   {
@@ -229,7 +237,7 @@ void Connection::Impl::report(FrameNumber frame, TimeNs drawn, TimeNs displayed)
     round_trip = offset.round_trip_ns();
   }
   for (ClientFrameTimes& t : taken) {
-    if (t.frame == frame) t.draw_begin = drawn, t.displayed = displayed;
+    if (t.frame == frame) t.displayed = displayed;
     t.clock_offset = clock_offset.value_or(0);
     t.clock_error = clock_offset ? *round_trip / 2 : -1;
   }
@@ -280,15 +288,17 @@ void Connection::send_pose(const TimedPose& pose) {
 
 const Pair* Connection::take_newest() {
   const Pair* pair = impl_->core->take_newest();
-  if (pair) impl_->draw_begin = impl_->clock.now();
+  if (!pair) return nullptr;
+  // Behind what the decoder still has to note of this frame.
+  asio::post(impl_->decoder, [impl = impl_.get(), frame = pair->frame, begin = impl_->clock.now()] {
+    impl->note_drawn(frame, begin);
+  });
   return pair;
 }
 
 void Connection::report_displayed(FrameNumber frame, TimeNs displayed_ns) {
-  // Behind what the decoder still has to note of this frame.
-  asio::post(impl_->decoder, [impl = impl_.get(), frame, drawn = impl_->draw_begin, displayed_ns] {
-    impl->report(frame, drawn, displayed_ns);
-  });
+  asio::post(impl_->decoder,
+             [impl = impl_.get(), frame, displayed_ns] { impl->report(frame, displayed_ns); });
 }
 
 Status Connection::status() const {

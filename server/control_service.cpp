@@ -148,6 +148,13 @@ v1::Scene ControlService::describe(const SceneInfo& info) const {
   scene.set_triangles(info.triangles);
   scene.set_materials(info.materials);
   scene.set_device_mib(info.device_mib);
+  v1::Box* box = scene.mutable_bounds();
+  box->set_min_x(info.bounds.min.x);
+  box->set_min_y(info.bounds.min.y);
+  box->set_min_z(info.bounds.min.z);
+  box->set_max_x(info.bounds.max.x);
+  box->set_max_y(info.bounds.max.y);
+  box->set_max_z(info.bounds.max.z);
   for (const std::string& note : info.notes) scene.add_notes(note);
   for (const PlannedPass& pass : info.plan.passes) {
     v1::Pass* out = scene.add_plan();

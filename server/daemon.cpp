@@ -1,5 +1,6 @@
 #include "server/daemon.h"
 
+#include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
@@ -47,6 +48,9 @@ StatusOr<std::shared_ptr<grpc::ServerCredentials>> credentials(const DaemonSetti
 // faults.
 void log_of_grpc(gpr_log_func_args* line) {
   spdlog::debug("grpc: {}:{}: {}", line->file, line->line, line->message);
+}
+void log_of_protobuf(google::protobuf::LogLevel, const char* file, int line, const std::string& message) {
+  spdlog::debug("protobuf: {}:{}: {}", file, line, message);
 }
 
 }  // namespace
@@ -120,6 +124,7 @@ struct Daemon::Impl {
 
 Status Daemon::Impl::start(const DaemonSettings& settings, const Clock& clock) {
   gpr_set_log_function(log_of_grpc);
+  google::protobuf::SetLogHandler(log_of_protobuf);
   TESSERA_RETURN_IF_ERROR(check(settings));  // before scenes take their time
   TESSERA_ASSIGN_OR_RETURN(StreamServerSettings stream, stream_settings(settings));
   TESSERA_RETURN_IF_ERROR(serve_pages(settings, stream));
@@ -220,6 +225,7 @@ void Daemon::drain() {
 
 Daemon::~Daemon() {
   drain();
+  if (impl_->streams) impl_->streams->end_all("the daemon is shutting down");  // calls may take their time
   if (impl_->grpc_server) impl_->grpc_server->Shutdown(std::chrono::system_clock::now() + kDrainTime);
   impl_->grpc_server.reset();
   impl_->pages.set_metrics({});

@@ -1,6 +1,7 @@
 // tesserad: renders scenes and streams their shading to many clients.
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <iostream>
@@ -34,6 +35,8 @@ Examples:
 
 Exit codes: 0 ended by a signal, or what was asked for is done; 1 could not start, or doctor found a fault; 2 wrong usage
 or configuration.)";
+
+constexpr std::chrono::milliseconds kShutdownTime{4500};
 
 // Signals are taken by whoever waits for them, in no other thread.
 sigset_t block_signals() {
@@ -70,6 +73,12 @@ int serve(const server::DaemonSettings& settings) {
              {"http_port", (*daemon)->http_port()}});
   serving = true;
   waits_for_signal.join();
+  std::thread([] {
+    std::this_thread::sleep_for(kShutdownTime);
+    log_event(spdlog::level::warn, "shutdown cut short",
+              {{"seconds", std::chrono::duration<double>(kShutdownTime).count()}});
+    std::_Exit(kOk);
+  }).detach();  // nothing stops a call that is loading a scene
   daemon->reset();
   return kOk;
 }

@@ -98,6 +98,7 @@ StatusOr<SceneLibrary::Entry> SceneLibrary::make(const std::string& name, const 
                        .source = source,
                        .triangles = scene->triangle_count,
                        .materials = static_cast<uint32_t>(scene->materials.size()),
+                       .bounds = scene->world_bounds(0),
                        .notes = notes.notes,
                        .plan = make_frame_plan(scene->features)}};
   TESSERA_RETURN_IF_ERROR(server_.run_on_device([&]() -> Status {

@@ -95,12 +95,10 @@ struct StreamServer::Impl {
   StatusOr<transport::Admission> admit(const transport::Hello& hello, const std::string& peer);
   StatusOr<Entry> find_token(const SessionToken& token) const;
   StatusOr<transport::Welcome> open_media(const Entry& entry);
-  void on_left(StreamedSession& session, const Status& reason);
   transport::MediaSessionEvents media_events(const std::shared_ptr<StreamedSession>& session);
   Status check_room(const SessionSettings& wanted) const;
   void refuse(const Status& reason, const std::string& peer);
   StatusOr<std::shared_ptr<StreamedSession>> find(SessionId id) const;
-  std::shared_ptr<StreamedSession> take(SessionId id);
   Status end(SessionId id, const Status& reason);
 
   const StreamServerSettings settings;
@@ -226,12 +224,6 @@ StatusOr<transport::Welcome> StreamServer::Impl::open_media(const Entry& entry) 
                             .srtp = stream.srtp};
 }
 
-void StreamServer::Impl::on_left(StreamedSession& session, const Status& reason) {
-  session.count_media();
-  media->remove_session(session.id(), std::string(reason.message()));
-  session.on_closed(reason);
-}
-
 StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello& hello,
                                                          const std::string& peer) {
   TESSERA_ASSIGN_OR_RETURN(const Entry entry, find_token(hello.token));
@@ -239,7 +231,7 @@ StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello&
   TESSERA_RETURN_IF_ERROR(session->admit(hello.client));
   StatusOr<transport::Welcome> welcome = open_media(entry);
   if (!welcome.ok()) {
-    on_left(*session, welcome.status());
+    session->on_closed(welcome.status());
     return welcome.status();
   }
   log_event(spdlog::level::info, "client connected",
@@ -253,10 +245,10 @@ StatusOr<transport::Admission> StreamServer::Impl::admit(const transport::Hello&
                        return status;
                      },
                  .on_closed =
-                     [this, session](const Status& reason) {
+                     [session](const Status& reason) {
                        log_event(spdlog::level::info, "client left",
                                  {{"session", session->id()}, {"reason", reason.ToString()}});
-                       on_left(*session, reason);
+                       session->on_closed(reason);
                      }},
       .on_connected = [this, session](std::shared_ptr<transport::MetaConnection> connection) {
         session->on_connected(std::move(connection));
@@ -292,23 +284,14 @@ Status StreamServer::Impl::check_room(const SessionSettings& wanted) const {
                    " allowed; end a session, take a smaller atlas or raise --max-atlas-mtexels"));
 }
 
-std::shared_ptr<StreamedSession> StreamServer::Impl::take(SessionId id) {
-  const std::lock_guard lock(mutex);
-  const auto found = sessions.find(id);
-  if (found == sessions.end()) return nullptr;
-  std::shared_ptr<StreamedSession> session = std::move(found->second.session);
-  sessions.erase(found);
-  add_counters(ended_counters, session->stats());
-  return session;
-}
-
 Status StreamServer::Impl::end(SessionId id, const Status& reason) {
-  const std::shared_ptr<StreamedSession> session = take(id);
-  if (!session) return no_such_session(id);
+  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> session, find(id));
   session->close(reason);
-  media->remove_session(id, std::string(reason.message()));
   {
     const std::lock_guard lock(mutex);
+    if (sessions.erase(id) == 0) return no_such_session(id);  // another call was faster
+    session->on_closed(reason);
+    add_counters(ended_counters, session->stats());
     ended.push_back(session);
     woken = true;
   }

@@ -11,6 +11,9 @@ namespace {
 using transport::FrameType;
 
 constexpr DurationNs kHistoryNs = kNsPerSecond / 2;       // of poses, for prediction
+constexpr size_t kMaxPoses = 256;
+// Of a client's view: id buffers of this size are drawn and read back for every predicted one.
+constexpr uint32_t kMaxViewPixels = 1u << 24;
 constexpr DurationNs kFirstRoundTripNs = 100 * kNsPerMs;  // assumed before the client has reported one
 constexpr DurationNs kMaxRoundTripNs = kNsPerSecond;
 constexpr size_t kMaxFramesInFlight = 256;
@@ -44,6 +47,11 @@ Status StreamedSession::admit(const transport::ClientSettings& client) {
     return absl::FailedPreconditionError(
         absl::StrCat("session ", id_, " has a client already; create a session for each client"));
   }
+  if (uint32_t{client.width} * client.height > kMaxViewPixels) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("a view of ", client.width, "x", client.height, " pixels; the limit is ", kMaxViewPixels,
+                     ": say hello with a smaller view, and draw as large as you like"));
+  }
   admitted_ = true;
   client_view_.width = client.width;
   client_view_.height = client.height;
@@ -66,6 +74,7 @@ void StreamedSession::on_connected(std::shared_ptr<transport::MetaConnection> co
 
 void StreamedSession::on_closed(const Status& reason) {
   const std::lock_guard lock(mutex_);
+  stats_.media += media_->remove_session(id_, std::string(reason.message()));
   connection_.reset();
   poses_.clear();
   under_way_.clear();
@@ -89,6 +98,7 @@ void StreamedSession::on_pose(const transport::SequencedPose& pose) {
   const std::lock_guard lock(mutex_);
   if (!poses_.empty() && pose.timed.time_ns <= poses_.back().time_ns) return;
   std::erase_if(poses_, [&](const TimedPose& p) { return p.time_ns < pose.timed.time_ns - kHistoryNs; });
+  if (poses_.size() == kMaxPoses) poses_.erase(poses_.begin());  // the times are the client's word
   poses_.push_back(pose.timed);
   newest_pose_sent_ns_ = pose.sent_ns;
   newest_pose_received_ns_ = clock_.now();
@@ -273,33 +283,34 @@ Status StreamedSession::send(const Work& work, const Frame& frame, FrameRecord r
   record.server.layout = from_ms(times.layout_ms);
   record.server.shading = from_ms(times.shading_ms);
   record.server.encode = from_ms(times.encode_ms);
+  record.server.sent = record.server.render_end;  // until it is known: the client may report before that
+  expect_report(record);
   // A client that left meanwhile is no error of this frame: on_closed() tells.
   if (!work.connection->send(FrameType::meta, frame.meta).ok()) return absl::OkStatus();
   const StatusOr<uint32_t> sent =
       media_->send_frame(id_, record.server.render_begin, frame.atlas.bytes, frame.atlas.key_frame);
   if (left(sent.status())) return on_unbound();
-  record.server.sent = clock_.now();
-  on_sent(record);
+  on_sent(record.frame, clock_.now());
   if (!absl::IsResourceExhausted(sent.status())) return sent.status();
   on_key_frame_request();
   return absl::OkStatus();
 }
 
-void StreamedSession::on_sent(const FrameRecord& record) {
+void StreamedSession::expect_report(const FrameRecord& record) {
   const std::lock_guard lock(mutex_);
-  ++stats_.frames_sent;
   under_way_[record.frame] = record;
   if (under_way_.size() > kMaxFramesInFlight) under_way_.erase(under_way_.begin());
+}
+
+void StreamedSession::on_sent(FrameNumber frame, TimeNs sent) {
+  const std::lock_guard lock(mutex_);
+  ++stats_.frames_sent;
+  if (const auto found = under_way_.find(frame); found != under_way_.end()) found->second.server.sent = sent;
 }
 
 void StreamedSession::release() {
   renderer_.reset();
   make_renderer_ = {};
-}
-
-void StreamedSession::count_media() {
-  const std::lock_guard lock(mutex_);
-  stats_.media += media_->sender_stats(id_).value_or(transport::RtpSenderStats());
 }
 
 StreamedSessionStats StreamedSession::stats() const {

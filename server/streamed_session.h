@@ -46,8 +46,6 @@ class StreamedSession {
                   OnRendered on_rendered = {});
 
   void on_connected(std::shared_ptr<transport::MetaConnection> connection);
-  // Before its stream is taken from the media port.
-  void count_media();
   void on_closed(const Status& reason);
   void on_bound();
   void on_pose(const transport::SequencedPose& pose);
@@ -93,7 +91,8 @@ class StreamedSession {
   Status send(const Work& work, const Frame& frame, FrameRecord record);
   void put_off();
   void count(const Frame& frame);
-  void on_sent(const FrameRecord& record);
+  void expect_report(const FrameRecord& record);
+  void on_sent(FrameNumber frame, TimeNs sent);
   DurationNs period_ns() const { return from_seconds(1.0 / rate_.frames_per_second); }  // under the lock
 
   const transport::SessionId id_;

@@ -8,6 +8,12 @@ DurationNs NackGenerator::interval_ns() const {
   return std::max(settings_.min_interval_ns, rtt_ns_ + rtt_ns_ / 4);
 }
 
+DurationNs NackGenerator::wait_ns(uint32_t tries) const {
+  DurationNs wait = interval_ns();
+  for (uint32_t i = kQuickTries; i < tries && wait < settings_.give_up_ns; ++i) wait += wait / 2;
+  return wait;
+}
+
 void NackGenerator::on_packet(TimeNs now, ExtendedSequence sequence) {
   if (const auto found = missing_.find(sequence); found != missing_.end()) {
     learn_rtt(now, found->second);
@@ -59,7 +65,7 @@ std::vector<ExtendedSequence> NackGenerator::poll(TimeNs now) {
   for (auto& [sequence, m] : missing_) {
     if (m.next_ns > now) continue;
     if (m.tries++ == 0) m.first_request_ns = now;
-    m.next_ns = now + interval_ns();
+    m.next_ns = now + wait_ns(m.tries);
     out.push_back(sequence);
   }
   requests_ += out.size();

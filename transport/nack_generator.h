@@ -14,7 +14,8 @@ namespace tessera::transport {
 struct NackSettings {
   DurationNs reorder_wait_ns = 3 * kNsPerMs;  // a packet that is merely late needs no request
   DurationNs min_interval_ns =
-      10 * kNsPerMs;                     // between two requests for one packet; else 5/4 of the round trip
+      10 * kNsPerMs;  // between two requests for one packet; else 5/4 of the round trip; it grows by half
+                      // from each to the next after the fourth, so that a hiccup of a short way is outlasted
   uint32_t max_tries = 12;               // then the packet is given up one interval later,
   DurationNs give_up_ns = kNsPerSecond;  // or this long after it was missed, whichever comes first
   size_t max_missing = 2048;             // more at once: all are given up
@@ -56,12 +57,14 @@ class NackGenerator {
     uint32_t tries = 0;
   };
   DurationNs interval_ns() const;
+  DurationNs wait_ns(uint32_t tries) const;  // after so many requests
   TimeNs due_ns(const Missing& m) const;
   bool overdue(TimeNs now, const Missing& m) const;
   void learn_rtt(TimeNs now, const Missing& m);
 
   NackSettings settings_;
   static constexpr int kAmbiguousAnswers = 4;
+  static constexpr uint32_t kQuickTries = 4;
   DurationNs rtt_ns_;
   int ambiguous_answers_ = 0;  // in a row
   TimeNs grown_ns_ = 0;        // when the estimate was last renewed

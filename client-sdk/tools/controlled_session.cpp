@@ -70,6 +70,7 @@ StatusOr<std::unique_ptr<ControlledSession>> ControlledSession::create(const Con
     return absl::Status(status.code(),
                         absl::StrCat("control at ", settings.endpoint, ": ", status.message()));
   session->id_ = made.session();
+  session->scene_ = scene;
   session->ticket_ = {.host = host_of(settings.endpoint),
                       .meta_port = static_cast<uint16_t>(made.meta_port()),
                       .authority_file = settings.authority_file};
@@ -77,6 +78,15 @@ StatusOr<std::unique_ptr<ControlledSession>> ControlledSession::create(const Con
     return absl::InternalError("the ticket's token has a wrong size");
   std::ranges::copy(made.token(), session->ticket_.token.begin());
   return session;
+}
+
+StatusOr<v1::Box> ControlledSession::bounds() {
+  grpc::ClientContext context;
+  v1::ListScenesResponse scenes;
+  TESSERA_RETURN_IF_ERROR(to_status(stub_->ListScenes(&context, {}, &scenes)));
+  for (const v1::Scene& scene : scenes.scenes())
+    if (scene.name() == scene_) return scene.bounds();
+  return absl::NotFoundError(absl::StrCat("the daemon holds no scene ", scene_, " any more"));
 }
 
 void ControlledSession::record_frames() {

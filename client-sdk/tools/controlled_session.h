@@ -28,6 +28,8 @@ class ControlledSession {
 
   const Ticket& ticket() const { return ticket_; }
   void keep() { kept_ = true; }
+  // Of the scene.
+  StatusOr<v1::Box> bounds();
   // From now on, for frames().
   void record_frames();
   std::vector<FrameRecord> frames();
@@ -37,6 +39,7 @@ class ControlledSession {
 
   std::unique_ptr<v1::Control::Stub> stub_;
   uint64_t id_ = 0;
+  std::string scene_;
   Ticket ticket_;
   bool kept_ = false;
   std::unique_ptr<FrameReader> reader_;

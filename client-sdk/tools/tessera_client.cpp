@@ -28,7 +28,7 @@ constexpr DurationNs kConnectTimeoutNs = 8 * kNsPerSecond;
 enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
 constexpr char kFooter[] = R"(Examples:
-  tessera-client --scene hall --seconds 5 --out pictures
+  tessera-client --scene hall --position 0 1.6 0 --seconds 5 --out pictures
   tessera-client --control 127.0.0.1:7310 --scene sponza --path sponza_1.csv --width 1280 --height 720 --save-every 10 --json run.json
   tessera-client --scene hall --out hall.mp4 --trace hall-trace.json
   tessera-client --control render.example:7310 --ca ca.pem --control-token-file token --scene hall --print-ticket
@@ -40,7 +40,7 @@ struct Settings {
   client::ControlSettings control;
   std::string scene, ticket, path, out, json, frames_csv, trace;
   bool print_ticket = false;
-  std::vector<double> position{0, 1.6, 0};
+  std::vector<double> position;
   double seconds = 5, fps = 60, fov_y_deg = 60;
   uint32_t width = 960, height = 540, save_every = 30;
 };
@@ -67,27 +67,38 @@ transport::ClientSettings client_settings(const Settings& s) {
           .name = "tessera-client"};
 }
 
-// Stands on the path, or at --position and looks around once in ten seconds.
+// Follows the path; or stands at --position and looks around; or walks around the whole scene, looking in. Once
+// around takes ten seconds.
 class Head {
  public:
-  static StatusOr<Head> create(const Settings& s) {
+  // `session` knows the scene; null: it cannot be asked.
+  static StatusOr<Head> create(const Settings& s, client::ControlledSession* session) {
     Head head;
-    head.still_.position = {s.position[0], s.position[1], s.position[2]};
-    if (s.path.empty()) return head;
-    TESSERA_ASSIGN_OR_RETURN(CameraPath path, CameraPath::load(s.path));
-    head.path_ = std::move(path);
+    if (!s.path.empty()) {
+      TESSERA_ASSIGN_OR_RETURN(CameraPath path, CameraPath::load(s.path));
+      head.path_ = std::move(path);
+    } else if (!s.position.empty()) {
+      head.center_ = {s.position[0], s.position[1], s.position[2]};
+    } else if (session) {
+      TESSERA_ASSIGN_OR_RETURN(const v1::Box box, session->bounds());
+      const dvec3 low(box.min_x(), box.min_y(), box.min_z()), high(box.max_x(), box.max_y(), box.max_z());
+      head.center_ = (low + high) / 2.0;
+      // The ball around the scene fits into the narrower field of view.
+      const Fov fov = view_of(s).fov;
+      head.distance_ = 0.5 * glm::length(high - low) / std::sin(0.5 * std::min(fov.width_rad(), fov.height_rad()));
+    }
     return head;
   }
   Pose at(DurationNs t) const {
     if (path_) return path_->at(path_->poses().front().time_ns + t);
-    Pose pose = still_;
-    pose.orientation = glm::angleAxis(to_seconds(t) * 0.6283185307, dvec3(0, 1, 0));
-    return pose;
+    const dquat turn = glm::angleAxis(to_seconds(t) * 0.6283185307, dvec3(0, 1, 0));
+    return {center_ + turn * dvec3(0, 0, distance_), turn};
   }
 
  private:
   std::optional<CameraPath> path_;
-  Pose still_;
+  dvec3 center_{0, 1.6, 0};
+  double distance_ = 0;  // from the centre, backwards
 };
 
 class Viewer {
@@ -188,7 +199,6 @@ Status write_frames(const Settings& s, const std::vector<FrameRecord>& records) 
 
 StatusOr<nlohmann::json> view(const Settings& s) {
   const SteadyClock clock;
-  TESSERA_ASSIGN_OR_RETURN(Head head, Head::create(s));
   std::unique_ptr<client::PictureWriter> writer;
   if (!s.out.empty()) {
     TESSERA_ASSIGN_OR_RETURN(
@@ -203,6 +213,7 @@ StatusOr<nlohmann::json> view(const Settings& s) {
     ticket = session->ticket();
     if (!s.frames_csv.empty() || !s.trace.empty()) session->record_frames();
   }
+  TESSERA_ASSIGN_OR_RETURN(Head head, Head::create(s, session.get()));
   TESSERA_ASSIGN_OR_RETURN(const auto connection,
                            client::connect(ticket, client_settings(s), kConnectTimeoutNs, clock));
   TESSERA_ASSIGN_OR_RETURN(const auto display,
@@ -259,9 +270,11 @@ int main(int argc, char** argv) {
   app.add_flag("--print-ticket", s.print_ticket,
                "print the new session's ticket, a secret, and leave it to an app")
       ->needs(scene);
-  app.add_option("--path", s.path, "camera path (CSV); none: look around at --position")
+  CLI::Option* path = app.add_option("--path", s.path, "camera path (CSV): t_seconds,px,py,pz,qx,qy,qz,qw")
       ->check(CLI::ExistingFile);
-  app.add_option("--position", s.position, "x y z in metres")->expected(3)->capture_default_str();
+  app.add_option("--position", s.position, "stand here (x y z in metres) and look around; neither this nor --path: walk around the scene")
+      ->expected(3)
+      ->excludes(path);
   app.add_option("--seconds", s.seconds, "how long, from the first picture on")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();

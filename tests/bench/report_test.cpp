@@ -66,6 +66,24 @@ TEST(Report, ASceneWithoutMaskedMaterialsHasNoSuchColumn) {
   EXPECT_THAT(page(folder.path()), Not(HasSubstr("masked edges")));
 }
 
+TEST(Report, LatencyIsShownOfRunsByTheRealClockOnly) {
+  const TemporaryFolder folder;
+  LoopbackResult result = sample_result();
+  ASSERT_TRUE(write_run(folder.path(), result).ok());
+  ASSERT_TRUE(write_report(folder.path()).ok());
+  EXPECT_THAT(page(folder.path()), Not(HasSubstr("tiling error")));
+  result.settings.clock = "real";
+  result.rows[0].overhead_ms = {0.25, 0.5, 0.75};
+  ASSERT_TRUE(write_run(folder.path(), result).ok());
+  ASSERT_TRUE(write_report(folder.path()).ok());
+  const std::string html = page(folder.path());
+  EXPECT_EQ(count(html, "tiling error"), 1u);
+  for (const auto& [name, duration] : FrameDurations().named())
+    EXPECT_THAT(html, HasSubstr(absl::StrCat("<th>", std::string(name), "</th>")));
+  EXPECT_THAT(html, HasSubstr("<td>60.00 / 80.00</td>")) << "downlink";
+  EXPECT_THAT(html, HasSubstr("<td>0.25 / 0.75</td>")) << "overhead";
+}
+
 TEST(Report, IsSelfContainedAndEscaped) {
   const TemporaryFolder folder;
   ASSERT_TRUE(write_run(folder.path(), sample_result()).ok());

@@ -32,9 +32,9 @@ tc qdisc add dev lo root netem delay 15ms 15ms loss "$loss%" 2>/dev/null ||
 
 folder=$(mktemp -d)
 trap 'kill "$daemon" 2>/dev/null || true; wait; rm -rf "$folder"' EXIT
-"$tesserad" --device cpu --scene hall=gallery:0 >"$folder/daemon.log" 2>&1 &
+"$tesserad" --device cpu --http-port 0 --scene hall=gallery:0 >"$folder/daemon.log" 2>&1 &
 daemon=$!
-until grep -q 'control on' "$folder/daemon.log"; do
+until grep -q 'serving ' "$folder/daemon.log"; do
   kill -0 "$daemon" 2>/dev/null || { cat "$folder/daemon.log"; fail "tesserad did not start"; }
   sleep 0.1
 done

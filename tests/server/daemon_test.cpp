@@ -20,6 +20,8 @@ TEST_F(DaemonTest, FromLoadToPictureToUnload) {
   EXPECT_GT(scene.triangles(), 0u);
   EXPECT_GT(scene.device_mib(), 0);
   EXPECT_GT(scene.plan_size(), 5);
+  EXPECT_LT(scene.bounds().min_y(), 1.6);
+  EXPECT_GT(scene.bounds().max_y(), 1.6) << "a hall to stand in";
 
   v1::Ticket ticket;
   ASSERT_TRUE(create("hall", &ticket).ok());

@@ -70,6 +70,9 @@ class FakeRenderer final : public FrameRenderer {
                std::unique_ptr<codec::VideoEncoder> encoder)
       : fake_(fake), settings_(settings), encoder_(std::move(encoder)) {}
 
+  void set_rate(const RateSplit& rate) override { settings_.rate = rate; }
+  const std::string& encoder() const override { return encoder_->choice(); }
+
   StatusOr<Frame> render(const FrameInput& input) override {
     std::this_thread::sleep_for(std::chrono::nanoseconds(fake_.render_time_ns));  // the device's work
     const uint32_t width = settings_.layout.width, height = settings_.layout.height;
@@ -83,8 +86,6 @@ class FakeRenderer final : public FrameRenderer {
     TESSERA_ASSIGN_OR_RETURN(frame.atlas, encoder_->encode(input.number, view, budget, key_frame));
     return frame;
   }
-  void set_rate(const RateSplit& rate) override { settings_.rate = rate; }
-  const std::string& encoder() const override { return encoder_->choice(); }
 
  private:
   const FakeRendererSettings fake_;

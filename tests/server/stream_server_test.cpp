@@ -67,6 +67,15 @@ class StreamServerTest : public test::StreamingTest {
     device_.reset();
   }
 
+  // `log` outlives the server.
+  static RendererFactory recording(std::vector<Recorded>& log) {
+    return
+        [&log, make = renders(scene_)](const SessionSettings& s) -> StatusOr<std::unique_ptr<FrameRenderer>> {
+          TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<FrameRenderer> session, make(s));
+          return std::make_unique<RecordingRenderer>(std::move(session), log);
+        };
+  }
+
   static SessionSettings small() {
     SessionSettings s;
     s.layout = atlas::blocks::settings_for(512, 256);
@@ -150,17 +159,76 @@ TEST_F(StreamServerTest, EveryFramesRecordTilesItsTimeFromPoseToPicture) {
   }
 }
 
+// Apps learn when a picture was shown from their compositor, often a frame later.
+TEST_F(StreamServerTest, ADisplayTimeMayComeAfterTheNextPairWasTaken) {
+  start();
+  const SessionTicket a = ticket();
+  auto client = connect(a);
+  ASSERT_TRUE(client.ok()) << client.status();
+  std::vector<FrameRecord> records;
+  uint64_t next = 0;
+  std::optional<FrameNumber> before;
+  TimeNs shown = 0;
+  EXPECT_TRUE(display_without_report(**client, [&](const client::Pair* pair) {
+    if (pair) {
+      if (before) (*client)->report_displayed(*before, shown);
+      before = pair->frame, shown = clock_.now();
+    }
+    const auto more = server_->records(a.session, next, next);
+    if (more.ok()) records.insert(records.end(), more->begin(), more->end());
+    return std::ranges::count_if(records, [](const auto& r) { return durations(r).has_value(); }) >= 5;
+  }));
+  for (const FrameRecord& r : records) {
+    const auto d = durations(r);
+    if (!d) continue;
+    EXPECT_GE(d->client_wait, 0) << "frame " << r.frame;
+    EXPECT_GE(d->display, 0) << "frame " << r.frame;
+    EXPECT_LE(std::abs(d->end_to_end - d->sum()), kNsPerMs) << "frame " << r.frame;
+  }
+}
+
+// Poses' times are the client's word: however close they lie, few are kept.
+TEST_F(StreamServerTest, AFloodOfPosesIsKeptShort) {
+  start();
+  std::vector<Recorded> log;  // the render thread's, until the server is gone
+  const auto a = server_->create_session(recording(log), small());
+  ASSERT_TRUE(a.ok()) << a.status();
+  auto client = connect(*a);
+  ASSERT_TRUE(client.ok()) << client.status();
+  TimeNs t = clock_.now() + kNsPerSecond;  // beyond those of the display loop
+  int pairs = 0;
+  EXPECT_TRUE(display_without_report(**client, [&](const client::Pair* pair) {
+    for (int i = 0; i < 500; ++i) (*client)->send_pose({++t, {.position = dvec3(0, 1.6, 0)}});
+    return (pairs += pair != nullptr) == 4;
+  }));
+  client->reset();
+  server_.reset();
+  ASSERT_FALSE(log.empty());
+  size_t most = 0;
+  for (const Recorded& r : log) most = std::max(most, r.poses.size());
+  EXPECT_LE(most, 256u);
+  EXPECT_GT(most, 100u) << "the flood arrived";
+}
+
+TEST_F(StreamServerTest, AHugeViewIsRefusedByItsPixels) {
+  start();
+  const SessionTicket a = ticket();
+  client::ConnectionSettings huge = connection(a);
+  huge.client.width = huge.client.height = 16384;
+  const auto refused = client::Connection::connect(huge, clock_);
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kResourceExhausted) << refused.status();
+  EXPECT_NE(std::string(refused.status().message()).find("16384x16384"), std::string::npos);
+  auto client = connect(a);  // the place is still free
+  ASSERT_TRUE(client.ok()) << client.status();
+  expect_pairs(**client, 1);
+}
+
 // The same inputs give the same pictures, whether real sockets and clocks lie between the two ends or
 // nothing.
 TEST_F(StreamServerTest, PicturesOverSocketsAreThoseOfVirtualTime) {
   start();
   std::vector<Recorded> log;  // the render thread's, until the server is gone
-  const auto recording =
-      [&, make = renders(scene_)](const SessionSettings& s) -> StatusOr<std::unique_ptr<FrameRenderer>> {
-    TESSERA_ASSIGN_OR_RETURN(std::unique_ptr<FrameRenderer> session, make(s));
-    return std::make_unique<RecordingRenderer>(std::move(session), log);
-  };
-  const auto a = server_->create_session(recording, small());
+  const auto a = server_->create_session(recording(log), small());
   ASSERT_TRUE(a.ok()) << a.status();
   auto connected = connect(*a);
   ASSERT_TRUE(connected.ok()) << connected.status();

@@ -51,16 +51,20 @@ class StreamingTest : public testing::Test {
 
   // A client's display loop until `done`: a pose each time, and what is newest is reported as shown.
   bool display_until(client::Connection& client, const std::function<bool(const client::Pair*)>& done) {
+    return display_without_report(client, [&](const client::Pair* pair) {
+      if (pair) client.report_displayed(pair->frame, clock_.now());
+      return done(pair);
+    });
+  }
+  bool display_without_report(client::Connection& client,
+                              const std::function<bool(const client::Pair*)>& done) {
     const TimeNs give_up = clock_.now() + kPatienceNs;
     while (clock_.now() < give_up) {
       TimedPose pose{clock_.now(), {}};
       pose.pose.position = dvec3(0, 1.6, 0);
       client.send_pose(pose);
       const client::Pair* pair = client.take_newest();
-      if (pair) {
-        check(*pair);
-        client.report_displayed(pair->frame, clock_.now());
-      }
+      if (pair) check(*pair);
       if (done(pair)) return true;
       std::this_thread::sleep_for(std::chrono::nanoseconds(kDisplayNs));
     }

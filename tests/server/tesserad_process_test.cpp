@@ -3,14 +3,20 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
+#include <boost/asio/io_context.hpp>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <thread>
+#include <vector>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
+#include "client-sdk/ticket.h"
 #include "daemon_fixture.h"
 #include "http_client.h"
+#include "transport/asio/asio.h"
 
 namespace tessera::server {
 namespace {
@@ -37,6 +43,24 @@ class Process : public DaemonTest {
   std::optional<int> exit_code() {
     EXPECT_TRUE(eventually([&] { return child_->exit_code().has_value(); }));
     return child_->exit_code();
+  }
+  // A daemon with the scene `hall`, ready for calls.
+  void serve(const std::string& arguments = {}) {
+    run("--scene hall=gallery:0 " + arguments + kFreePorts);
+    ASSERT_TRUE(logged("serving")) << log();
+    control_ = v1::Control::NewStub(grpc::CreateChannel(
+        absl::StrCat("127.0.0.1:", port_in_log("control_port")), grpc::InsecureChannelCredentials()));
+  }
+  // Also if the signal comes again and again.
+  void expect_end() {
+    const TimeNs begin = clock_.now();
+    EXPECT_TRUE(eventually([&] {
+      const bool over = child_->exit_code().has_value();
+      if (!over) child_->signal(SIGTERM);
+      return over;
+    }));
+    RecordProperty("shutdown_ms", static_cast<int>(to_ms(clock_.now() - begin)));
+    EXPECT_EQ(exit_code(), 0) << log();
   }
   uint16_t port_in_log(const std::string& key) {
     const std::string text = log();
@@ -68,6 +92,84 @@ TEST_F(Process, ASignalEndsItWhileScenesLoad) {
   child_->signal(SIGTERM);
   EXPECT_EQ(exit_code(), 0) << log();
   EXPECT_EQ(log().find("serving"), std::string::npos) << "too quick to show anything";
+}
+
+TEST_F(Process, ASignalEndsItWhileClientsConnect) {
+  ASSERT_NO_FATAL_FAILURE(serve());
+  namespace asio = transport::asio;
+  asio::io_context io;
+  std::vector<asio::ip::tcp::socket> silent;
+  for (int i = 0; i < 5; ++i) {
+    silent.emplace_back(io);
+    silent.back().connect({asio::ip::address_v4::loopback(), port_in_log("meta_port")});
+  }
+  expect_end();
+}
+
+TEST_F(Process, ASignalEndsItWhileASceneLoadsOnRequest) {
+  ASSERT_NO_FATAL_FAILURE(serve());
+  std::atomic<bool> calling = false;
+  std::thread caller([&] {
+    calling = true;
+    (void)load("city", "city:4000000");
+  });
+  ASSERT_TRUE(eventually([&] { return calling.load(); }));
+  expect_end();
+  caller.join();
+}
+
+TEST_F(Process, ASignalUnderLoadEndsItAndClientsAreTold) {
+  ASSERT_NO_FATAL_FAILURE(serve());
+  std::atomic<int> streaming = 0;
+  std::vector<std::thread> clients;
+  for (int i = 0; i < 4; ++i) {
+    clients.emplace_back([&] {
+      v1::Ticket ticket;
+      ASSERT_TRUE(create("hall", &ticket).ok());
+      const auto client = connect(ticket);
+      ASSERT_TRUE(client.ok()) << client.status();
+      ASSERT_NE(first_pair(**client), nullptr) << (*client)->status();
+      ++streaming;
+      while (first_pair(**client)) {
+      }
+      EXPECT_THAT(std::string((*client)->status().message()), HasSubstr("shutting down"));
+    });
+  }
+  EXPECT_TRUE(eventually([&] { return streaming == 4; }));
+  expect_end();
+  for (std::thread& client : clients) client.join();
+}
+
+// R13: whoever reaches the control port must not fill the log.
+TEST_F(Process, ARequestThatCannotBeReadLeavesNoLine) {
+  ASSERT_NO_FATAL_FAILURE(serve());
+  const size_t before = log().size();
+  EXPECT_FALSE(load("\xff", "gallery:0").ok());
+  EXPECT_EQ(log().size(), before) << log();
+}
+
+// R13: nobody says bye, and nobody else notices.
+TEST_F(Process, AKilledViewerMayComeAgainWithItsTicket) {
+  ASSERT_NO_FATAL_FAILURE(serve());
+  v1::Ticket others, ticket;
+  ASSERT_TRUE(create("hall", &others).ok());
+  const auto other = connect(others);
+  ASSERT_TRUE(other.ok()) << other.status();
+  ASSERT_TRUE(create("hall", &ticket).ok());
+  client::Ticket written{.host = "127.0.0.1", .meta_port = port_in_log("meta_port")};
+  std::ranges::copy(ticket.token(), written.token.begin());
+  const std::string view = absl::StrCat(TESSERA_CLIENT, " --ticket ", client::to_string(written),
+                                        " --width 160 --height 90 --seconds ");
+  {
+    ChildProcess viewer(view + "60", folder_.file("killed"));
+    ASSERT_TRUE(eventually([&] { return get(ticket.session()).frames_sent() >= 5; }));
+    viewer.signal(SIGKILL);
+    ASSERT_TRUE(eventually([&] { return !get(ticket.session()).connected(); }));
+  }
+  ChildProcess again(view + "0.3", folder_.file("again"));
+  ASSERT_TRUE(eventually([&] { return again.exit_code().has_value(); }));
+  EXPECT_EQ(again.exit_code(), 0);
+  EXPECT_NE(first_pair(**other), nullptr) << (*other)->status();
 }
 
 TEST_F(Process, ItAnswersWhileScenesLoad) {
@@ -119,8 +221,7 @@ TEST_F(Process, TokensAreNotLogged) {
   const std::string token_file = folder_.file("token");
   transport::test::write_file(token_file, control_token);
   std::filesystem::permissions(token_file, std::filesystem::perms::owner_read);
-  run("--log trace --scene hall=gallery:0 --control-token-file " + token_file + kFreePorts);
-  ASSERT_TRUE(logged("serving")) << log();
+  ASSERT_NO_FATAL_FAILURE(serve("--log trace --control-token-file " + token_file));
   const std::string where = absl::StrCat("127.0.0.1:", port_in_log("control_port"));
   const auto show = [&](const std::string& token) {
     control_ = v1::Control::NewStub(control_channel(where, grpc::InsecureChannelCredentials(), token));

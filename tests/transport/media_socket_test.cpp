@@ -151,7 +151,7 @@ TEST_F(MediaSockets, AWrongTokenFailsWithAReason) {
   const StreamIds ids = add_session(1);
   MediaClientSettings settings = settings_of(1, ids);
   settings.token = token(99);
-  settings.answer_timeout_ns = 300 * kNsPerMs;
+  settings.bind_timeout_ns = 300 * kNsPerMs;
   settings.hello_interval_ns = 50 * kNsPerMs;
   Status failure;
   connect(settings, {.on_failed = [&](Status s) { failure = std::move(s); }});

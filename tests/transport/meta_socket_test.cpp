@@ -244,6 +244,30 @@ TEST_F(MetaSockets, APeerThatTakesNothingIsClosed) {
   EXPECT_THAT(std::string(server_closed->message()), HasSubstr("took no data"));
 }
 
+TEST_F(MetaSockets, APeerThatTakesLittleCannotHoldTheClose) {
+  listen({.connection = {.max_queued_bytes = 64u << 20, .close_timeout_ns = 100 * kNsPerMs}});
+  tcp::socket client = raw_client();
+  say_hello(client);
+  for (int i = 0; i < 300; ++i) ASSERT_TRUE(server->send(FrameType::meta, Bytes(100'000)).ok());
+  server->close(absl::OkStatus());
+  Bytes buffer(64 << 10);
+  asio::steady_timer pause(io);
+  size_t taken = 0;
+  std::function<void()> sip = [&] {
+    pause.expires_after(std::chrono::milliseconds(20));
+    pause.async_wait([&](SystemError) {
+      SystemError error;
+      taken += client.read_some(asio::buffer(buffer), error);
+      if (!error || error == asio::error::would_block) sip();
+    });
+  };
+  client.non_blocking(true);
+  sip();
+  ASSERT_TRUE(run_until([&] { return server_closed.has_value(); }));
+  EXPECT_LT(taken, 10'000'000u);
+  EXPECT_EQ(server->queued_bytes(), 0u);
+}
+
 TEST_F(MetaSockets, StrangersAreClosed) {
   listen({.hello_timeout_ns = 100 * kNsPerMs});
   const Bytes cases[] = {

@@ -103,5 +103,23 @@ TEST(NackGenerator, LearnsTheRoundTrip) {
   }
 }
 
+// On a short way twelve quick requests would be over before a hiccup of a tenth of a second is.
+TEST(NackGenerator, RequestsOnAShortWaySpanTheTimeUntilGivingUp) {
+  NackGenerator nack({});
+  nack.set_rtt(2 * kNsPerMs);
+  nack.on_packet(0, 1);
+  nack.on_packet(0, 3);
+  std::vector<TimeNs> asked;
+  for (TimeNs now = 0; nack.missing() > 0; now = *nack.next_event_ns()) {
+    if (!nack.poll(now).empty()) asked.push_back(now);
+    if (nack.missing() == 0) break;
+  }
+  ASSERT_EQ(asked.size(), 12u);
+  EXPECT_LE(asked[3] - asked[0], 3 * 10 * kNsPerMs) << "the first ones come quickly";
+  EXPECT_GE(asked.back(), 300 * kNsPerMs);
+  EXPECT_LE(asked.back(), kNsPerSecond);
+  EXPECT_EQ(nack.given_up(), 1u);
+}
+
 }  // namespace
 }  // namespace tessera::transport

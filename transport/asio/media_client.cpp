@@ -117,11 +117,11 @@ void MediaClient::step() {
     const std::lock_guard lock(mutex_);
     if (closed_) return;
     const TimeNs now = clock_.now();
-    if (now - last_answer_ns_ > settings_.answer_timeout_ns) {
+    if (now - last_answer_ns_ > patience_ns()) {
       const std::string cause = socket_->last_error();
       failure = absl::DeadlineExceededError(absl::StrCat(
           "no answer by UDP from ", settings_.server_address, ":", settings_.server_port, " for ",
-          to_seconds(settings_.answer_timeout_ns), " s", cause.empty() ? "" : absl::StrCat(" (", cause, ")"),
+          to_seconds(patience_ns()), " s", cause.empty() ? "" : absl::StrCat(" (", cause, ")"),
           ": does a firewall block the port, is the token right, does the session still exist?"));
     } else {
       if (now >= next_hello_ns_) send_hello(now);
@@ -137,7 +137,7 @@ void MediaClient::step() {
 }
 
 void MediaClient::schedule() {
-  TimeNs next = std::min(next_hello_ns_, last_answer_ns_ + settings_.answer_timeout_ns + 1);
+  TimeNs next = std::min(next_hello_ns_, last_answer_ns_ + patience_ns() + 1);
   next = std::min(next, receiver_.next_event_ns());
   timer_.expires_after(std::chrono::nanoseconds(std::max<DurationNs>(0, next - clock_.now())));
   timer_.async_wait([self = shared_from_this()](SystemError error) {

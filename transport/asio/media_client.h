@@ -27,7 +27,8 @@ struct MediaClientSettings {
   std::optional<SrtpKeys> srtp;                     // of the welcome
   DurationNs hello_interval_ns = 200 * kNsPerMs;    // until the first answer
   DurationNs keep_alive_ns = 2 * kNsPerSecond;      // afterwards: measures the round trip, renews the binding
-  DurationNs answer_timeout_ns = 8 * kNsPerSecond;  // without an answer: on_failed
+  DurationNs bind_timeout_ns = 8 * kNsPerSecond;    // without a first answer: on_failed
+  DurationNs answer_timeout_ns = 8 * kNsPerSecond;  // without another one: likewise
 };
 
 // Called on the client's executor, one at a time, never while it holds a lock.
@@ -63,6 +64,7 @@ class MediaClient : public std::enable_shared_from_this<MediaClient> {
   void send_feedback(Datagram datagram);
   void step();
   void schedule();
+  DurationNs patience_ns() const { return bound_ ? settings_.answer_timeout_ns : settings_.bind_timeout_ns; }
   void fail(Status status);
 
   const Clock& clock_;

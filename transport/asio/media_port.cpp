@@ -53,15 +53,17 @@ Status MediaPort::add_session(SessionId session, const SessionToken& token, std:
   return absl::OkStatus();
 }
 
-void MediaPort::remove_session(SessionId session, const std::string& reason) {
+RtpSenderStats MediaPort::remove_session(SessionId session, const std::string& reason) {
   const std::lock_guard lock(mutex_);
   const auto found = sessions_.find(session);
-  if (found == sessions_.end()) return;
+  if (found == sessions_.end()) return {};
   const Datagram bye = found->second.sender->make_bye(clock_.now(), reason);
   if (const auto address = binding_.address_of(session)) send(*address, found->second, bye);
   for (auto& [id, tap] : found->second.taps) tap->send(*socket_, bye);
   binding_.remove(session);
+  const RtpSenderStats sent = found->second.sender->stats();
   sessions_.erase(found);
+  return sent;
 }
 
 void MediaPort::on_datagram(const PeerAddress& from, std::span<const uint8_t> datagram) {

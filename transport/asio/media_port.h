@@ -43,8 +43,8 @@ class MediaPort : public std::enable_shared_from_this<MediaPort> {
   // authenticated, and poses by UDP, which are not, are refused.
   Status add_session(SessionId session, const SessionToken& token, std::unique_ptr<RtpSender> sender,
                      MediaSessionEvents events, const std::optional<SrtpKeys>& srtp = std::nullopt);
-  // Says BYE to the client.
-  void remove_session(SessionId session, const std::string& reason);
+  // Says BYE to the client. What was sent to it in all.
+  RtpSenderStats remove_session(SessionId session, const std::string& reason);
 
   // Sends the session's video to another address too, in its own SRTP if `srtp` is given, for players that
   // know nothing of sessions. A tapped stream has a key frame every two seconds, so that they may begin at

@@ -166,7 +166,7 @@ void MetaConnection::watch_stall() {
     {
       const std::lock_guard lock(self->mutex_);
       if (self->closed_ || !self->writing_) return;
-      if (self->progress_ != before) return self->watch_stall();
+      if (self->progress_ != before && !self->closing_) return self->watch_stall();
     }
     self->finish(absl::DeadlineExceededError(
         absl::StrCat("the peer took no data for ", to_seconds(self->settings_.stall_timeout_ns), " s while ",

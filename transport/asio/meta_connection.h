@@ -24,7 +24,7 @@ struct MetaConnectionSettings {
   size_t max_queued_bytes = 8u << 20;               // that wait for the peer; more closes the connection
   size_t max_payload = kDefaultMaxFramePayload;     // of a frame that comes in
   DurationNs stall_timeout_ns = 10 * kNsPerSecond;  // data waits and the peer takes none of it: closes
-  DurationNs close_timeout_ns = 2 * kNsPerSecond;   // likewise, once close() was called
+  DurationNs close_timeout_ns = 2 * kNsPerSecond;   // for what is queued when close() is called, in all
 };
 
 // Called on the stream's executor, never while the connection holds a lock.

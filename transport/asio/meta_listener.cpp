@@ -78,6 +78,22 @@ void MetaListener::accept() {
                          });
 }
 
+// Whoever comes in masses is not waited for: what the system does not take at once is not said.
+void MetaListener::refuse(asio::ip::tcp::socket socket) {
+  if (const auto count = refusal_log_.event(SteadyClock().now()))
+    log_event(spdlog::level::warn, "connections refused",
+              {{"port", port_}, {"count", *count}, {"others_without_hello", waiting_.size()}});
+  if (settings_.tls) return;  // nothing can be said before the handshake
+  std::vector<uint8_t> frame;
+  (void)write_frame(
+      FrameType::error,
+      encode(ErrorMessage{ErrorCode::full, "too many connections wait for their hello; try again"}),
+      frame);  // short enough
+  SystemError ignored;
+  socket.non_blocking(true, ignored);
+  socket.write_some(asio::buffer(frame), ignored);
+}
+
 void MetaListener::on_accepted(SystemError error, asio::ip::tcp::socket socket) {
   const std::lock_guard lock(mutex_);
   if (!acceptor_.is_open()) return;
@@ -91,7 +107,7 @@ void MetaListener::on_accepted(SystemError error, asio::ip::tcp::socket socket) 
     return;
   }
   accept();
-  if (waiting_.size() >= settings_.max_waiting) return;  // closes it
+  if (waiting_.size() >= settings_.max_waiting) return refuse(std::move(socket));
   tune(socket);
   SystemError ignored;
   const auto remote = socket.remote_endpoint(ignored);

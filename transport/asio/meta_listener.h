@@ -12,6 +12,7 @@
 #include "base/time.h"
 #include "transport/asio/asio.h"
 #include "transport/asio/meta_connection.h"
+#include "transport/session_binding.h"
 
 namespace tessera::transport {
 
@@ -20,7 +21,7 @@ struct MetaListenerSettings {
   uint16_t port = 0;                               // 0: a free one
   std::shared_ptr<TlsContext> tls;                 // empty: plain TCP
   DurationNs hello_timeout_ns = 5 * kNsPerSecond;  // from the connection to its hello, TLS handshake included
-  size_t max_waiting = 64;                         // connections that have not said hello
+  size_t max_waiting = 64;                         // connections that have not said hello; more are refused
   size_t max_client_payload = 64u << 10;           // of frames that clients send, once they are known
   MetaConnectionSettings connection;               // max_payload is not used
 };
@@ -51,6 +52,7 @@ class MetaListener : public std::enable_shared_from_this<MetaListener> {
   MetaListener(asio::any_io_executor executor, const MetaListenerSettings& settings, Admit admit);
   void accept();
   void on_accepted(SystemError error, asio::ip::tcp::socket socket);
+  void refuse(asio::ip::tcp::socket socket);
   void begin_hello(std::unique_ptr<ByteStream> stream, std::shared_ptr<Waiting> waiting);
   Status on_hello(const std::shared_ptr<Waiting>& waiting, FrameType type, std::span<const uint8_t> payload);
   void forget(const std::shared_ptr<Waiting>& waiting);
@@ -62,6 +64,7 @@ class MetaListener : public std::enable_shared_from_this<MetaListener> {
   asio::ip::tcp::acceptor acceptor_;
   asio::steady_timer retry_timer_;
   std::set<std::shared_ptr<Waiting>> waiting_;
+  LogLimiter refusal_log_;
   uint16_t port_ = 0;
 };
 
