@@ -121,9 +121,13 @@ bool ControlService::wait(uint32_t ms) {
 grpc::Status ControlService::answer(const char* call, const Status& status) {
   if (status.ok()) return grpc::Status::OK;
   const grpc::Status out = to_grpc(status);
-  const std::lock_guard lock(mutex_);
-  ++refusals_[{call, out.error_code()}];
+  count_refusal(call, out.error_code());
   return out;
+}
+
+void ControlService::count_refusal(const char* call, grpc::StatusCode code) {
+  const std::lock_guard lock(mutex_);
+  ++refusals_[{call, code}];
 }
 
 ControlService::Refusals ControlService::refusals() const {

@@ -29,6 +29,8 @@ class ControlService final : public v1::Control::Service {
   // Calls that were refused, by name and code.
   using Refusals = std::map<std::pair<std::string, grpc::StatusCode>, uint64_t>;
   Refusals refusals() const;
+  // Of a call that did not get as far as this service, too.
+  void count_refusal(const char* call, grpc::StatusCode code);
 
   grpc::Status GetServerInfo(grpc::ServerContext*, const v1::GetServerInfoRequest*, v1::ServerInfo*) override;
   grpc::Status LoadScene(grpc::ServerContext*, const v1::LoadSceneRequest*, v1::Scene*) override;

@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "base/log.h"
+#include "proto/control_access.h"
+#include "server/control_guard.h"
 #include "server/control_service.h"
 #include "server/doctor.h"
 #include "server/http_server.h"
@@ -33,7 +35,8 @@ StatusOr<std::string> read_text(const std::string& file) {
 }
 
 StatusOr<std::shared_ptr<grpc::ServerCredentials>> credentials(const DaemonSettings& settings) {
-  if (settings.tls_certificate.empty()) return grpc::InsecureServerCredentials();
+  // Clear text as gRPC has it takes no guard; as what xDS falls back to, without xDS, it does.
+  if (settings.tls_certificate.empty()) return grpc::XdsServerCredentials(grpc::InsecureServerCredentials());
   TESSERA_ASSIGN_OR_RETURN(const std::string certificate, read_text(settings.tls_certificate));
   TESSERA_ASSIGN_OR_RETURN(const std::string key, read_text(settings.tls_key));
   grpc::SslServerCredentialsOptions options;
@@ -75,8 +78,23 @@ StatusOr<StreamServerSettings> stream_settings(const DaemonSettings& s) {
   return out;
 }
 
+StatusOr<std::string> control_token(const DaemonSettings& s) {
+  if (!s.control_token_file.empty()) {
+    StatusOr<std::string> token = read_control_token(s.control_token_file);
+    if (token.ok()) return token;
+    return absl::InvalidArgumentError(absl::StrCat("--control-token-file: ", token.status().message()));
+  }
+  TESSERA_ASSIGN_OR_RETURN(const auto address, transport::parse_address(s.address));
+  if (s.insecure || address.is_loopback()) return std::string();
+  return absl::InvalidArgumentError(
+      absl::StrCat("binding ", s.address,
+                   " would let whoever reaches the control port steer the daemon: give "
+                   "--control-token-file, or say --insecure"));
+}
+
 Status check(const DaemonSettings& settings) {
   TESSERA_RETURN_IF_ERROR(stream_settings(settings).status());
+  TESSERA_RETURN_IF_ERROR(control_token(settings).status());
   for (const std::string& scene : settings.scenes) TESSERA_RETURN_IF_ERROR(name_and_source(scene).status());
   return absl::OkStatus();
 }
@@ -100,7 +118,7 @@ struct Daemon::Impl {
   Status serve_pages(const DaemonSettings& settings, const StreamServerSettings& stream);
   StatusOr<v1::ServerInfo> server_info(const DaemonSettings& settings) const;
   Status load_scenes(const std::vector<std::string>& scenes);
-  Status serve_control(const DaemonSettings& settings);
+  Status serve_control(const DaemonSettings& settings, const Clock& clock);
   void set_serving(bool serving);
 };
 
@@ -120,7 +138,7 @@ Status Daemon::Impl::start(const DaemonSettings& settings, const Clock& clock) {
   scenes = std::make_unique<SceneLibrary>(device, *streams, settings.scene_root, settings.max_scene_mib);
   control = std::make_unique<ControlService>(*streams, *scenes, info);
   pages.set_metrics([this] { return metrics->text(*streams, *scenes, *control); });
-  TESSERA_RETURN_IF_ERROR(serve_control(settings));
+  TESSERA_RETURN_IF_ERROR(serve_control(settings, clock));
   TESSERA_RETURN_IF_ERROR(load_scenes(settings.scenes));
   set_serving(true);
   return absl::OkStatus();
@@ -166,8 +184,13 @@ void Daemon::Impl::set_serving(bool serving) {
   if (grpc_server) grpc_server->GetHealthCheckService()->SetServingStatus(serving);
 }
 
-Status Daemon::Impl::serve_control(const DaemonSettings& settings) {
+Status Daemon::Impl::serve_control(const DaemonSettings& settings, const Clock& clock) {
   TESSERA_ASSIGN_OR_RETURN(const auto secret, credentials(settings));
+  TESSERA_ASSIGN_OR_RETURN(const std::string token, control_token(settings));
+  if (!token.empty()) {
+    const auto count = [this] { control->count_refusal("control", grpc::StatusCode::UNAUTHENTICATED); };
+    secret->SetAuthMetadataProcessor(std::make_shared<ControlGuard>(token, count, clock));
+  }
   TESSERA_ASSIGN_OR_RETURN(const auto address, transport::parse_address(settings.address));
   TESSERA_RETURN_IF_ERROR(transport::check_tcp_port("gRPC", address, settings.control_port));
   const std::string where = transport::to_string(address, settings.control_port);
@@ -196,8 +219,12 @@ StatusOr<std::unique_ptr<Daemon>> Daemon::start(const DaemonSettings& settings, 
   return daemon;
 }
 
-Daemon::~Daemon() {
+void Daemon::drain() {
   impl_->set_serving(false);
+}
+
+Daemon::~Daemon() {
+  drain();
   if (impl_->streams) impl_->streams->end_all("the daemon is shutting down");  // calls may take their time
   if (impl_->grpc_server) impl_->grpc_server->Shutdown(std::chrono::system_clock::now() + kDrainTime);
   impl_->grpc_server.reset();

@@ -20,7 +20,8 @@ struct DaemonSettings {
   uint16_t http_port = 7313;          // metrics and health; likewise
   bool no_http = false;
   std::string tls_certificate, tls_key;  // PEM files; both or none
-  bool insecure = false;                 // other addresses than loopback in clear text
+  std::string control_token_file;        // its first line is what control calls must show; empty: nothing
+  bool insecure = false;  // other addresses than loopback in clear text, without a control token
   uint32_t max_sessions = 32;
   uint32_t max_atlas_mtexels = 128;  // 2^20 texels, of all sessions together
   uint32_t max_scene_mib = 0;        // device memory of all scenes together; 0: what the device has
@@ -37,7 +38,10 @@ struct DaemonSettings {
 StatusOr<StreamServerSettings> stream_settings(const DaemonSettings& settings);
 // Of a scene option. InvalidArgument: not NAME=SOURCE.
 StatusOr<std::pair<std::string, std::string>> name_and_source(const std::string& scene);
-// Both of these, of all settings; ports, scenes and devices are not touched.
+// What control calls must show; empty: nothing. InvalidArgument: an unfit file, or none for an address beyond
+// loopback without `insecure`.
+StatusOr<std::string> control_token(const DaemonSettings& settings);
+// All of these, of all settings; ports, scenes and devices are not touched.
 Status check(const DaemonSettings& settings);
 const char* version();
 
@@ -46,8 +50,12 @@ class Daemon {
   // Serves once it returns; /healthz and /readyz answer from its first moments on. `clock` outlives the
   // daemon.
   static StatusOr<std::unique_ptr<Daemon>> start(const DaemonSettings& settings, const Clock& clock);
-  // Lets nothing new in, tells the clients, and ends within a few seconds.
+  // Drains, tells the clients, and ends within a few seconds.
   ~Daemon();
+
+  // Lets nothing new in: calls that would are UNAVAILABLE, /readyz is 503, watchers are sent home. Sessions
+  // go on.
+  void drain();
 
   uint16_t control_port() const;
   uint16_t meta_port() const;

@@ -21,7 +21,7 @@ void add_options(CLI::App& app, DaemonSettings& s, LogSettings& log) {
     app.add_flag("--" + name, field, meaning)->group(group)->envname(variable(name));
   };
   add("Network", "address", s.address,
-      "where to listen, in numbers; beyond loopback TLS or --insecure is needed");
+      "where to listen, in numbers; beyond loopback TLS and a control token are needed, or --insecure");
   add("Network", "control-port", s.control_port, "gRPC; 0 takes a free one");
   add("Network", "meta-port", s.meta_port, "TCP: geometry and control of a stream");
   add("Network", "media-port", s.media_port, "UDP: video and poses");
@@ -29,7 +29,10 @@ void add_options(CLI::App& app, DaemonSettings& s, LogSettings& log) {
   flag("Network", "no-http", s.no_http, "open no HTTP port");
   add("Network", "tls-certificate", s.tls_certificate, "PEM file; media is then SRTP");
   add("Network", "tls-key", s.tls_key, "PEM file");
-  flag("Network", "insecure", s.insecure, "send tokens and pictures in clear text beyond loopback");
+  add("Network", "control-token-file", s.control_token_file,
+      "its first line is a secret that gRPC calls must show; others may not read it (chmod o=)");
+  flag("Network", "insecure", s.insecure,
+       "beyond loopback, do without TLS (tokens and pictures go in clear text) and without a control token");
   add("Sessions", "max-sessions", s.max_sessions, "more are refused")->check(CLI::Range(1, 1024));
   add("Sessions", "max-atlas-mtexels", s.max_atlas_mtexels,
       "2^20 texels of all sessions' atlases together; an atlas of 2048x1024 has 2")

@@ -44,6 +44,13 @@ Detail check_configuration(const DaemonSettings& settings) {
   return settings.insecure ? "clear text, as --insecure says" : "clear text, on loopback";
 }
 
+Detail check_control_token(const DaemonSettings& settings) {
+  TESSERA_ASSIGN_OR_RETURN(const std::string token, control_token(settings));
+  if (!token.empty()) return "calls must show the one in " + settings.control_token_file;
+  return settings.insecure ? "none: whoever reaches the control port steers the daemon, as --insecure says"
+                           : "none: every program on this machine may steer the daemon";
+}
+
 Detail check_tcp(const DaemonSettings& settings, uint16_t port) {
   TESSERA_ASSIGN_OR_RETURN(const auto address, transport::parse_address(settings.address));
   return described(transport::check_tcp_port("TCP", address, port), transport::to_string(address, port));
@@ -90,6 +97,7 @@ std::vector<Finding> examine(const DaemonSettings& settings) {
     findings.push_back({std::move(check), detail.status(), detail.ok() ? *detail : std::string()});
   };
   add("configuration", check_configuration(settings));
+  add("control token", check_control_token(settings));
   add("control port", check_tcp(settings, settings.control_port));
   add("meta port", check_tcp(settings, settings.meta_port));
   add("media port", check_udp(settings));

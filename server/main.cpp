@@ -27,7 +27,7 @@ told.
 Examples:
   tesserad --scene hall=gallery
   tesserad --scene sponza=sponza.glb --scene-root /srv/scenes --max-sessions 8
-  tesserad --address 0.0.0.0 --tls-certificate server.pem --tls-key server.key --scene hall=gallery
+  tesserad --address 0.0.0.0 --tls-certificate server.pem --tls-key server.key --control-token-file token --scene hall=gallery
   tesserad --config tesserad.toml --check-config
   tesserad --config tesserad.toml doctor         # would it start? if not, what to do
   tesserad --print-config > tesserad.toml        # every option with its default

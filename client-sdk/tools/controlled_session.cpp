@@ -7,6 +7,9 @@
 #include <fstream>
 #include <sstream>
 
+#include "proto/control_access.h"
+#include "transport/asio/endpoint.h"
+
 namespace tessera::client {
 namespace {
 
@@ -33,13 +36,32 @@ std::string host_of(absl::string_view endpoint) {
   return std::string(host);
 }
 
+bool is_loopback(const std::string& host) {
+  const auto address = transport::parse_address(host);
+  return host == "localhost" || (address.ok() && address->is_loopback());
+}
+
+// Empty: there is none.
+StatusOr<std::string> token(const ControlSettings& settings) {
+  if (settings.token_file.empty()) return std::string();
+  StatusOr<std::string> token = read_control_token(settings.token_file);
+  if (!token.ok())
+    return absl::InvalidArgumentError(absl::StrCat("--control-token-file: ", token.status().message()));
+  if (!settings.authority_file && !settings.insecure && !is_loopback(host_of(settings.endpoint)))
+    return absl::InvalidArgumentError(absl::StrCat("the control token would go to ", settings.endpoint,
+                                                   " in clear text: give --ca, or say --insecure"));
+  return token;
+}
+
 }  // namespace
 
 StatusOr<std::unique_ptr<ControlledSession>> ControlledSession::create(const ControlSettings& settings,
                                                                        const std::string& scene) {
   TESSERA_ASSIGN_OR_RETURN(const auto channel_credentials, credentials(settings));
   std::unique_ptr<ControlledSession> session(new ControlledSession);
-  session->stub_ = v1::Control::NewStub(grpc::CreateChannel(settings.endpoint, channel_credentials));
+  TESSERA_ASSIGN_OR_RETURN(const std::string control_token, token(settings));
+  session->stub_ =
+      v1::Control::NewStub(control_channel(settings.endpoint, channel_credentials, control_token));
   grpc::ClientContext context;
   v1::CreateSessionRequest request;
   request.set_scene(scene);

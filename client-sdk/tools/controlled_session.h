@@ -15,6 +15,8 @@ namespace tessera::client {
 struct ControlSettings {
   std::string endpoint = "127.0.0.1:7310";    // host:port of the daemon's gRPC
   std::optional<std::string> authority_file;  // of TLS, for control and session; none: clear text
+  std::string token_file;  // whose first line each call shows; empty: the daemon wants none
+  bool insecure = false;   // show it in clear text beyond loopback
 };
 
 class ControlledSession {

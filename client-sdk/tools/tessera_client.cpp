@@ -31,7 +31,7 @@ constexpr char kFooter[] = R"(Examples:
   tessera-client --scene hall --position 0 1.6 0 --seconds 5 --out pictures
   tessera-client --control 127.0.0.1:7310 --scene sponza --path sponza_1.csv --width 1280 --height 720 --save-every 10 --json run.json
   tessera-client --scene hall --out hall.mp4 --trace hall-trace.json
-  tessera-client --control render.example:7310 --ca ca.pem --scene hall --print-ticket
+  tessera-client --control render.example:7310 --ca ca.pem --control-token-file token --scene hall --print-ticket
   tessera-client --ticket tessera://127.0.0.1:7311/TOKEN --out pictures
 
 Exit codes: 0 done, 1 the stream failed, 2 wrong usage.)";
@@ -257,6 +257,10 @@ int main(int argc, char** argv) {
   CLI::Option* authority = app.add_option(
       "--ca", s.control.authority_file,
       "TLS: who signed the server's certificate (PEM; '': whom the system trusts), for control and session");
+  app.add_option("--control-token-file", s.control.token_file,
+                 "its first line is the secret that the daemon's control port wants")
+      ->envname("TESSERA_CONTROL_TOKEN_FILE");
+  app.add_flag("--insecure", s.control.insecure, "send the control token in clear text beyond loopback");
   CLI::Option* scene =
       app.add_option("--scene", s.scene, "view a scene that the daemon holds, in a new session");
   app.add_option("--ticket", s.ticket, "view the session of this ticket: tessera://HOST:PORT/TOKEN[?ca=FILE]")

@@ -116,5 +116,48 @@ TEST_F(Program, SpeaksTlsToControlAndSession) {
   EXPECT_THAT(errors_, HasSubstr("/no/such.pem"));
 }
 
+TEST_F(Program, ShowsTheControlTokenFromItsFile) {
+  const transport::test::Certificate certificate("localhost");
+  const auto token_file = [&](const std::string& name, const std::string& token) {
+    std::ofstream(file(name)) << token;
+    std::filesystem::permissions(file(name), std::filesystem::perms::owner_read);
+    return file(name);
+  };
+  const std::string right = token_file("right", "0123456789abcdef"),
+                    wrong = token_file("wrong", "123456789abcdef0");
+  start({.tls_certificate = certificate.certificate_file(),
+         .tls_key = certificate.key_file(),
+         .control_token_file = right});
+  const std::string command = viewer("--scene hall --ca " + certificate.certificate_file(), "localhost");
+  const std::string frames = " --frames-csv " + file("frames.csv");  // by a call of its own
+  ASSERT_EQ(run(command + frames + " --control-token-file " + right), 0) << errors_;
+  EXPECT_GT(std::ranges::count(text_of(file("frames.csv")), '\n'), 1);
+  ASSERT_EQ(run("TESSERA_CONTROL_TOKEN_FILE=" + right + " " + command), 0) << errors_;
+
+  EXPECT_EQ(run(command), 1);
+  EXPECT_THAT(errors_, AllOf(HasSubstr("control at localhost:"), HasSubstr("no control token"),
+                             HasSubstr("--control-token-file")));
+  EXPECT_EQ(run(command + " --control-token-file " + wrong), 1);
+  EXPECT_THAT(errors_, HasSubstr("wrong control token"));
+  EXPECT_EQ(run(command + " --control-token-file /no/such/file"), 1);
+  EXPECT_THAT(errors_, AllOf(HasSubstr("--control-token-file"), HasSubstr("/no/such/file")));
+  std::filesystem::permissions(right, std::filesystem::perms::others_read,
+                               std::filesystem::perm_options::add);
+  EXPECT_EQ(run(command + " --control-token-file " + right), 1);
+  EXPECT_THAT(errors_, HasSubstr("chmod o="));
+}
+
+// 0.0.0.0 is this machine too, but does not say so.
+TEST_F(Program, KeepsTheControlTokenOutOfClearTextBeyondLoopback) {
+  start({});
+  std::ofstream(file("token")) << "0123456789abcdef";
+  std::filesystem::permissions(file("token"), std::filesystem::perms::owner_read);
+  const std::string arguments = "--scene hall --print-ticket --control-token-file " + file("token");
+  EXPECT_EQ(run(viewer(arguments)), 0) << errors_;
+  EXPECT_EQ(run(viewer(arguments, "0.0.0.0")), 1);
+  EXPECT_THAT(errors_, AllOf(HasSubstr("0.0.0.0"), HasSubstr("clear text"), HasSubstr("--ca")));
+  EXPECT_EQ(run(viewer(arguments + " --insecure", "0.0.0.0")), 0) << errors_;
+}
+
 }  // namespace
 }  // namespace tessera::client::test

@@ -10,6 +10,7 @@
 
 #include "../transport/child_process.h"
 #include "client-sdk/connection.h"
+#include "proto/control_access.h"
 #include "server/daemon.h"
 #include "tessera/v1/control.grpc.pb.h"
 
@@ -32,16 +33,18 @@ class DaemonTest : public testing::Test {
     control_ = v1::Control::NewStub(channel(settings.tls_certificate));
   }
 
-  // `certificate`: what the daemon must show, made for "localhost"; empty: clear text.
-  std::shared_ptr<grpc::Channel> channel(const std::string& certificate) const {
+  // `certificate`: what the daemon must show, made for "localhost"; empty: clear text. `token`: what calls
+  // show.
+  std::shared_ptr<grpc::Channel> channel(const std::string& certificate,
+                                         const std::string& token = "") const {
     const std::string where = "127.0.0.1:" + std::to_string(daemon_->control_port());
-    if (certificate.empty()) return grpc::CreateChannel(where, grpc::InsecureChannelCredentials());
+    if (certificate.empty()) return control_channel(where, grpc::InsecureChannelCredentials(), token);
     const std::vector<uint8_t> pem = transport::test::read_file(certificate);
     grpc::SslCredentialsOptions options;
     options.pem_root_certs.assign(pem.begin(), pem.end());
     grpc::ChannelArguments arguments;
     arguments.SetSslTargetNameOverride("localhost");
-    return grpc::CreateCustomChannel(where, grpc::SslCredentials(options), arguments);
+    return control_channel(where, grpc::SslCredentials(options), token, arguments);
   }
 
   grpc::Status load(const std::string& name, const std::string& source, v1::Scene* scene = nullptr) {

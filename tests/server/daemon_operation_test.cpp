@@ -77,6 +77,24 @@ TEST_F(Operation, NothingNewIsLetInBeforeAndAfterItServes) {
   expect_refused(control.LoadScene(nullptr, &load, &scene), StatusCode::UNAVAILABLE, "shutting down");
 }
 
+// RELIABILITY R14, over sockets.
+TEST_F(Operation, ADrainLetsNothingNewInAndKeepsWhatRuns) {
+  start({.scenes = {"hall=gallery:0"}});
+  v1::Ticket ticket, second;
+  ASSERT_TRUE(create("hall", &ticket).ok());
+  auto client = connect(ticket);
+  ASSERT_TRUE(client.ok()) << client.status();
+  EXPECT_THAT(test::get(daemon_->http_port(), "/readyz"), StartsWith("HTTP/1.1 200 "));
+  daemon_->drain();
+  expect_refused(create("hall", &second), StatusCode::UNAVAILABLE, "shutting down");
+  expect_refused(load("second", "gallery:0"), StatusCode::UNAVAILABLE, "shutting down");
+  EXPECT_THAT(test::get(daemon_->http_port(), "/readyz"),
+              testing::AllOf(StartsWith("HTTP/1.1 503 "), HasSubstr("draining")));
+  EXPECT_THAT(test::get(daemon_->http_port(), "/healthz"), StartsWith("HTTP/1.1 200 "));
+  EXPECT_NE(first_pair(**client), nullptr) << (*client)->status();
+  EXPECT_TRUE(get(ticket.session()).connected());
+}
+
 TEST_F(Operation, ServerInfoNamesDeviceEncoderAndLimits) {
   start({.max_sessions = 5, .max_atlas_mtexels = 6, .max_scene_mib = 700, .max_watchers = 8});
   grpc::ClientContext context;
@@ -228,7 +246,9 @@ TEST_F(Operation, DoctorNamesEachFaultAndNoOther) {
               testing::ElementsAre("control port", "meta port", "media port", "http port"));
   s = free;
   s.address = "0.0.0.0";
-  EXPECT_THAT(failed(examine(s)), testing::ElementsAre("configuration"));
+  EXPECT_THAT(failed(examine(s)), testing::ElementsAre("configuration", "control token"));
+  s.insecure = true;
+  EXPECT_THAT(failed(examine(s)), testing::IsEmpty());
   s = free;
   s.scenes = {"a=/no/such/file.glb", "b"};
   s.scene_root = "/no/such/folder";
@@ -243,7 +263,7 @@ TEST_F(Operation, DoctorNamesEachFaultAndNoOther) {
 
 TEST_F(Operation, DoctorReadsCertificates) {
   const transport::test::Certificate good("localhost"), other("localhost"), old("localhost", -60);
-  DaemonSettings s{.address = "0.0.0.0", .control_port = 0, .meta_port = 0, .media_port = 0, .http_port = 0};
+  DaemonSettings s{.control_port = 0, .meta_port = 0, .media_port = 0, .http_port = 0};
   s.tls_certificate = good.certificate_file();
   EXPECT_THAT(failed(examine(s)), testing::ElementsAre("configuration")) << "no key";
   s.tls_key = other.key_file();

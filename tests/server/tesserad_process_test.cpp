@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <boost/asio/io_context.hpp>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
@@ -216,8 +217,19 @@ TEST_F(Process, JsonLogsAreJsonFromTheFirstLineToTheLast) {
 
 // Neither at the most talkative level, nor of clients that are refused.
 TEST_F(Process, TokensAreNotLogged) {
-  ASSERT_NO_FATAL_FAILURE(serve("--log trace"));
+  const std::string control_token = "controls-0123456789";
+  const std::string token_file = folder_.file("token");
+  transport::test::write_file(token_file, control_token);
+  std::filesystem::permissions(token_file, std::filesystem::perms::owner_read);
+  ASSERT_NO_FATAL_FAILURE(serve("--log trace --control-token-file " + token_file));
+  const std::string where = absl::StrCat("127.0.0.1:", port_in_log("control_port"));
+  const auto show = [&](const std::string& token) {
+    control_ = v1::Control::NewStub(control_channel(where, grpc::InsecureChannelCredentials(), token));
+  };
   v1::Ticket ticket;
+  show(control_token + "x");
+  expect_refused(create("hall", &ticket), grpc::StatusCode::UNAUTHENTICATED, "wrong control token");
+  show(control_token);
   ASSERT_TRUE(create("hall", &ticket).ok());
   const std::string right = ticket.token();
   auto client = connect(ticket);
@@ -228,7 +240,8 @@ TEST_F(Process, TokensAreNotLogged) {
   child_->signal(SIGTERM);
   EXPECT_EQ(exit_code(), 0);
   std::string text = log();
-  EXPECT_THAT(text, HasSubstr("client connected"));
+  EXPECT_THAT(text, AllOf(HasSubstr("client connected"), HasSubstr("control calls refused")));
+  EXPECT_EQ(text.find("controls-"), text.npos);
   const std::string start = right.substr(0, 8);  // of both tokens
   EXPECT_EQ(text.find(start), text.npos);
   EXPECT_EQ(text.find(absl::Base64Escape(right).substr(0, 8)), text.npos);
@@ -241,8 +254,8 @@ TEST_F(Process, WrongUsageIsTwo) {
   EXPECT_EQ(exit_code(), 2);
   run("--max-sessions 0");
   EXPECT_EQ(exit_code(), 2);
-  for (const char* wrong :
-       {"--address 0.0.0.0", "--address localhost", "--scene hall", "--tls-key key.pem"}) {
+  for (const char* wrong : {"--address 0.0.0.0", "--address localhost", "--scene hall", "--tls-key key.pem",
+                            "--control-token-file /no/such/file"}) {
     run(wrong + kFreePorts);
     EXPECT_EQ(exit_code(), 2) << wrong;
     run(std::string("--check-config ") + wrong);
