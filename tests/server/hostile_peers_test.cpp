@@ -101,7 +101,9 @@ TEST_F(HostilePeersTest, WhatIsNoProtocolIsAnswered) {
 
 TEST_F(HostilePeersTest, AClientThatTurnsBadEndsOnlyItsOwnConnection) {
   const Bytes bad[] = {frame(FrameType::meta, Bytes(8)), frame(FrameType::timing, Bytes(3)),
-                       frame(FrameType::pose, Bytes(51)), Bytes{0x7f, 0, 0, 0, 4}, Bytes{0, 0, 0, 0, 200}};
+                       frame(FrameType::pose, Bytes(51)), frame(FrameType::bye, {0, 1, 0xff}),
+                       frame(FrameType::error, {0, 1, 0, 1, 0xff}), Bytes{0x7f, 0, 0, 0, 4},
+                       Bytes{0, 0, 0, 0, 200}};
   const SessionTicket mine = ticket();
   for (const Bytes& tail : bad) {
     Bytes bytes = hello(mine);

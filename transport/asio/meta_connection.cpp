@@ -86,13 +86,11 @@ void MetaConnection::on_read(SystemError error, size_t bytes) {
 
 Status MetaConnection::on_frame(FrameType type, std::span<const uint8_t> payload) {
   if (type == FrameType::bye) {
-    const auto message = decode_bye(payload);
-    finish(!message.ok()             ? message.status()
-           : message->reason.empty() ? absl::OkStatus()
-                                     : absl::CancelledError(message->reason));
+    TESSERA_ASSIGN_OR_RETURN(const ByeMessage message, decode_bye(payload));
+    finish(message.reason.empty() ? absl::OkStatus() : absl::CancelledError(message.reason));
   } else if (type == FrameType::error) {
-    const auto message = decode_error(payload);
-    finish(message.ok() ? to_status(*message) : message.status());
+    TESSERA_ASSIGN_OR_RETURN(const ErrorMessage message, decode_error(payload));
+    finish(to_status(message));
   } else {
     return events_.on_frame ? events_.on_frame(type, payload) : absl::OkStatus();
   }
