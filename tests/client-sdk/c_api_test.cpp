@@ -114,6 +114,7 @@ TEST(CApi, WrongCreateInfosAreNamed) {
   expect(kWrong, "connectTimeout", [](Info& i) { i.connectTimeout = -1; });
   const std::string long_name(65, 'x');
   expect(kWrong, "applicationName", [&](Info& i) { i.applicationName = long_name.c_str(); });
+  expect(kWrong, "not UTF-8", [](Info& i) { i.applicationName = "caf\xe9"; });
 }
 
 TEST(CApi, ARefusedConnectionIsLostAndNamesTheStep) {
@@ -207,6 +208,13 @@ TEST_F(CApiSession, WrongPosesAreNamedAndChangeNothing) {
   expect("position", {{0, 2e9, 0}, {0, 0, 0, 1}}, now + 100);
   expect("position", {{0, NAN, 0}, {0, 0, 0, 1}}, now + 100);
   expect("predictedDisplayTime", kHead, now);
+  constexpr int64_t kWallClock = 1'800'000'000'000'000'000;
+  for (const int64_t time : {kWallClock, -kWallClock, (int64_t{1} << 60) + 1, INT64_MAX, INT64_MIN}) {
+    expect("info->predictedDisplayTime is " + std::to_string(time), kHead, time);
+    EXPECT_THAT(last_error(), HasSubstr("tesseraGetTime()"));
+    EXPECT_EQ(tesseraReportDisplayed(session.get(), 1, time), TESSERA_ERROR_VALIDATION);
+    EXPECT_THAT(last_error(), HasSubstr("displayTime is " + std::to_string(time)));
+  }
   EXPECT_EQ(session.send_pose(kHead, now + 1), TESSERA_SUCCESS);
 }
 
