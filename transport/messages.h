@@ -75,6 +75,7 @@ enum class ErrorCode : uint16_t {
   malformed = 3,
   too_slow = 4,  // the peer did not take its data
   full = 5,      // no room for another session or connection
+  busy = 6,      // the session has a client already
 };
 struct ErrorMessage {
   ErrorCode code = ErrorCode::internal;

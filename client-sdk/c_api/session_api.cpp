@@ -104,10 +104,14 @@ TesseraEventKind kind_of(SessionEvent::Kind kind) {
   return TESSERA_EVENT_STATE_CHANGED;
 }
 
+TesseraResult why_lost(const Status& reason) {
+  return absl::IsFailedPrecondition(reason) ? TESSERA_ERROR_BUSY : result_of(reason);
+}
+
 void fill(TesseraEvent& out, const SessionEvent& event) {
   out.kind = kind_of(event.kind);
   out.state = state_of(event.state);
-  out.result = result_of(event.reason);
+  out.result = why_lost(event.reason);
   out.frame = event.frame;
   const absl::string_view text = event.reason.message();
   const size_t size = std::min(text.size(), sizeof(out.reason) - 1);
@@ -161,7 +165,8 @@ TesseraResult tesseraSendPose(TesseraSession session, const TesseraPoseInfo* inf
     const auto pose = pose_of(info->pose, "info->pose");
     TESSERA_FAIL_IF_ERROR(pose.status());
     TESSERA_FAIL_IF_ERROR(check_time(info->predictedDisplayTime, "info->predictedDisplayTime"));
-    TESSERA_FAIL_IF_ERROR(session->session.status());
+    if (const Status lost = session->session.status(); !lost.ok())
+      return failure(why_lost(lost), lost.message());
     if (!advance(session->newest_pose_time, info->predictedDisplayTime))
       return failure(TESSERA_ERROR_VALIDATION,
                      "info->predictedDisplayTime is not later than that of the pose before");

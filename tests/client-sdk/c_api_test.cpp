@@ -54,7 +54,10 @@ bool show_until(tessera::Session& session, std::vector<TesseraEvent>& events, co
     if (done()) return true;
     while (const auto event = session.poll_event()) events.push_back(*event);
     if (!events.empty() && events.back().state == TESSERA_SESSION_LOST) return false;
-    session.send_pose(kHead, tesseraGetTime());
+    auto pose = make<TesseraPoseInfo>();
+    pose.pose = kHead;
+    pose.predictedDisplayTime = tesseraGetTime();
+    (void)tesseraSendPose(session.get(), &pose);  // the next event tells if the session was lost meanwhile
     std::this_thread::sleep_for(std::chrono::milliseconds(5));  // the display's rate
   }
   return false;
@@ -154,6 +157,23 @@ TEST_F(CApiSession, AnUnknownTokenIsRefused) {
   ASSERT_FALSE(events.empty());
   EXPECT_EQ(events.back().result, TESSERA_ERROR_REFUSED);
   EXPECT_THAT(events.back().reason, HasSubstr("hello"));
+}
+
+TEST_F(CApiSession, ASecondAppIsToldThatTheSessionIsBusy) {
+  const std::string ticket = ticket_text();
+  tessera::Session first(create_info(ticket));
+  std::vector<TesseraEvent> events;
+  ASSERT_TRUE(show_until(first, events, [&] { return first.statistics().frames > 0; }));
+  tessera::Session second(create_info(ticket));
+  events.clear();
+  show_until(second, events, [] { return false; });
+  ASSERT_FALSE(events.empty());
+  EXPECT_EQ(events.back().state, TESSERA_SESSION_LOST);
+  EXPECT_EQ(events.back().result, TESSERA_ERROR_BUSY);
+  EXPECT_THAT(events.back().reason, HasSubstr("has a client already"));
+  auto pose = make<TesseraPoseInfo>();
+  pose.pose = kHead;
+  EXPECT_EQ(tesseraSendPose(second.get(), &pose), TESSERA_ERROR_BUSY);
 }
 
 TEST_F(CApiSession, EventsComeInOrderFromConnectingToTheServersReason) {

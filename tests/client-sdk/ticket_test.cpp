@@ -127,7 +127,8 @@ TEST(Ticket, AnAddressThatSwallowsConnectsLeavesTimeForTheNext) {
   const Hole next("127.0.0.3", hole.port());
   const Status silence = failure({"127.0.0.2", "127.0.0.3"});
   EXPECT_THAT(std::string(silence.message()), HasSubstr("TCP 127.0.0.3:"));
-  EXPECT_THAT(std::string(silence.message()), HasSubstr("no answer to connect for 0.")) << "not a second each";
+  EXPECT_THAT(std::string(silence.message()), HasSubstr("no answer to connect for 0."))
+      << "not a second each";
 }
 
 }  // namespace

@@ -164,12 +164,13 @@ TEST(Messages, TextsAreUtf8) {
     EXPECT_EQ(decode_bye(bye).ok(), decode_error(error).ok());
     return decode_bye(bye).ok();
   };
-  for (const char* good : {"", "00", "7f", "c280", "dfbf", "e0a080", "ed9fbf", "ee8080", "efbfbf", "f0908080",
-                           "f48fbfbf"})
+  for (const char* good :
+       {"", "00", "7f", "c280", "dfbf", "e0a080", "ed9fbf", "ee8080", "efbfbf", "f0908080", "f48fbfbf"})
     EXPECT_TRUE(is_read(good)) << good;
-  for (const char* bad : {"ff", "fe", "80", "bf", "61ff62", "c3", "c328", "e282", "e28228", "f09f98",  // cut
-                          "c080", "c1bf", "e09fbf", "f08fbfbf",                     // longer than need be
-                          "eda080", "edbfbf",                                       // surrogates
+  for (const char* bad : {"ff",       "fe",       "80",         "bf",          "61ff62",
+                          "c3",       "c328",     "e282",       "e28228",      "f09f98",  // cut
+                          "c080",     "c1bf",     "e09fbf",     "f08fbfbf",       // longer than need be
+                          "eda080",   "edbfbf",                                   // surrogates
                           "f4908080", "f5808080", "f888808080", "fc8480808080"})  // beyond U+10FFFF
     EXPECT_FALSE(is_read(bad)) << bad;
   Hello hello = some_hello();

@@ -14,6 +14,7 @@ ErrorCode error_code(const Status& status) {
   switch (status.code()) {
     case absl::StatusCode::kUnauthenticated:
     case absl::StatusCode::kPermissionDenied:
+    case absl::StatusCode::kNotFound:  // the session has ended, and its token with it
       return ErrorCode::bad_token;
     case absl::StatusCode::kUnimplemented:
       return ErrorCode::unsupported_version;
@@ -23,6 +24,8 @@ ErrorCode error_code(const Status& status) {
       return ErrorCode::too_slow;
     case absl::StatusCode::kResourceExhausted:
       return ErrorCode::full;
+    case absl::StatusCode::kFailedPrecondition:
+      return ErrorCode::busy;
     default:
       return ErrorCode::internal;
   }
@@ -41,6 +44,8 @@ Status to_status(const ErrorMessage& message) {
       return absl::DeadlineExceededError(text);
     case ErrorCode::full:
       return absl::ResourceExhaustedError(text);
+    case ErrorCode::busy:
+      return absl::FailedPreconditionError(text);
     default:
       return absl::InternalError(text);
   }

@@ -11,10 +11,10 @@
  * too. Results: 0 done; above 0 done, with something to know; below 0 not done, and nothing has changed.
  * Space: metres, right-handed, +Y up; a head looks along its -Z. Angles are tangents. Colours are sRGB.
  * Time: int64 nanoseconds of CLOCK_MONOTONIC, as std::chrono::steady_clock on Linux and System.nanoTime() on
- * Android, within ±2^60 (36 years), where the wall clock's are not. Text: UTF-8. Threads: a function that says
- * "any thread" may be called from several at once. Those of the "drawing thread" may be called from one thread
- * at a time, all of a session's together. Destroying a handle must be the last use of it. Memory: the library
- * keeps no pointer that it is given, and no exception leaves it.
+ * Android, within ±2^60 (36 years), where the wall clock's are not. Text: UTF-8. Threads: a function that
+ * says "any thread" may be called from several at once. Those of the "drawing thread" may be called from one
+ * thread at a time, all of a session's together. Destroying a handle must be the last use of it. Memory: the
+ * library keeps no pointer that it is given, and no exception leaves it.
  */
 #ifndef TESSERA_TESSERA_H_
 #define TESSERA_TESSERA_H_
@@ -61,6 +61,7 @@ typedef enum TesseraResult {
   TESSERA_ERROR_TIMEOUT = -9,
   TESSERA_ERROR_REFUSED = -10,       /* the server does not know the ticket's token */
   TESSERA_ERROR_SESSION_ENDED = -11, /* by the server; the text has its reason */
+  TESSERA_ERROR_BUSY = -12,          /* another app watches the session: try again once it has left */
 
   TESSERA_RESULT_MAX_ENUM = 0x7fffffff
 } TesseraResult;
