@@ -221,7 +221,10 @@ StatusOr<nlohmann::json> view(const Settings& s) {
   Viewer viewer(s, std::move(head), *connection, *display, writer.get(), clock);
   TESSERA_RETURN_IF_ERROR(viewer.run());
   if (writer) TESSERA_RETURN_IF_ERROR(writer->finish());
-  if (session) TESSERA_RETURN_IF_ERROR(write_frames(s, session->frames()));
+  if (session) {
+    TESSERA_ASSIGN_OR_RETURN(const std::vector<FrameRecord> frames, session->frames());
+    TESSERA_RETURN_IF_ERROR(write_frames(s, frames));
+  }
   const client::ConnectionStats stats = connection->stats();
   const Totals& totals = viewer.totals();
   return nlohmann::json{{"frames_displayed", totals.displayed},

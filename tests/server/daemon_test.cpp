@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon_fixture.h"
+#include "proto/frame_reader.h"
 #include "transport/asio/asio.h"
 #include "transport/frame_io.h"
 #include "transport/messages.h"
@@ -94,6 +95,33 @@ TEST_F(DaemonTest, WatchersOfFramesGetEachRecordOnce) {
   EXPECT_EQ(rest[0].index(), 4u);
   EXPECT_EQ(rest[0].frame(), records[4].frame());
   EXPECT_TRUE(watch(1u << 30, true, 1000).empty());
+}
+
+TEST_F(DaemonTest, AFrameReaderTellsWhyItHasNoRecords) {
+  start({.max_watchers = 2, .scenes = {"hall=gallery:0"}});
+  v1::Ticket ticket;
+  ASSERT_TRUE(create("hall", &ticket).ok());
+  const auto read = [&](uint64_t session) { return FrameReader(*control_, session).finish().status(); };
+  {
+    grpc::ClientContext contexts[2];
+    std::unique_ptr<grpc::ClientReader<v1::Session>> watchers[2];
+    v1::WatchSessionRequest request;
+    request.set_session(ticket.session());
+    for (int i = 0; i < 2; ++i) {
+      watchers[i] = control_->WatchSession(&contexts[i], request);
+      v1::Session session;
+      ASSERT_TRUE(watchers[i]->Read(&session));
+    }
+    const Status refused = read(ticket.session());
+    EXPECT_TRUE(absl::IsResourceExhausted(refused)) << refused;
+    for (int i = 0; i < 2; ++i) {
+      contexts[i].TryCancel();
+      (void)watchers[i]->Finish();
+    }
+  }
+  // The server takes a moment to notice that a watcher has left.
+  EXPECT_TRUE(eventually([&] { return absl::IsNotFound(read(99)); }));
+  EXPECT_TRUE(eventually([&] { return read(ticket.session()).ok(); })) << "none yet is no error";
 }
 
 TEST_F(DaemonTest, WatchersSeeTheSessionUntilItEnds) {
