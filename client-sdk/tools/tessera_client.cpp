@@ -182,6 +182,13 @@ Status print_ticket(const Settings& s) {
   TESSERA_ASSIGN_OR_RETURN(const auto session, client::ControlledSession::create(s.control, s.scene));
   session->keep();
   std::cout << client::to_string(session->ticket()) << std::endl;
+  std::string tls = " -plaintext";
+  if (s.control.authority_file)
+    tls = s.control.authority_file->empty() ? "" : absl::StrCat(" -cacert ", *s.control.authority_file);
+  std::cerr << absl::StrFormat(
+      "session %u stays until it is deleted: grpcurl%s -d '{\"session\": %u}' %s "
+      "tessera.v1.Control/DeleteSession\n",
+      session->id(), tls, session->id(), s.control.endpoint);
   return absl::OkStatus();
 }
 
