@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/utf8.h"
+
 namespace tessera {
 namespace {
 
@@ -17,16 +19,25 @@ constexpr char kJsonMark = '\x1e';
 
 std::atomic<LogFormat> format_in_force = LogFormat::text;
 
-// As JSON has it, which keeps a line whole in text as well.
-std::string json_text(absl::string_view text) {
-  return nlohmann::json(std::string(text)).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+bool has_controls(absl::string_view text) {
+  for (size_t i = 0; i < text.size(); ++i) {
+    const auto c = static_cast<unsigned char>(text[i]);
+    const auto next = static_cast<unsigned char>(i + 1 < text.size() ? text[i + 1] : 0);
+    if (c < 0x20 || c == 0x7f || (c == 0xc2 && next >= 0x80 && next < 0xa0)) return true;  // C0, DEL, C1
+  }
+  return false;
 }
 
-// As it is, unless it has control characters or some that mean something.
+// As JSON has it, which keeps a line whole in text as well. Left alone, JSON escapes of the controls C0 only.
+std::string json_text(absl::string_view text) {
+  return nlohmann::json(std::string(text))
+      .dump(-1, ' ', has_controls(text), nlohmann::json::error_handler_t::replace);
+}
+
+// As it is, unless it has control characters or some that mean something, or is no UTF-8.
 std::string as_text(absl::string_view text, absl::string_view special) {
-  const bool plain = !text.empty() && std::none_of(text.begin(), text.end(), [&](char c) {
-    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f || special.find(c) != special.npos;
-  });
+  const bool plain = !text.empty() && !has_controls(text) && text.find_first_of(special) == text.npos &&
+                     utf8_prefix({text.data(), text.size()}).size() == text.size();
   return plain ? std::string(text) : json_text(text);
 }
 

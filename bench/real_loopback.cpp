@@ -17,6 +17,7 @@
 #include "bench/streamer.h"
 #include "bench/temporary_folder.h"
 #include "bench/truth_source.h"
+#include "client-sdk/ticket.h"
 #include "proto/frame_reader.h"
 #include "scene/procedural.h"
 
@@ -26,7 +27,8 @@ namespace {
 using nlohmann::json;
 
 constexpr std::chrono::milliseconds kPoll{20};
-constexpr size_t kLogTail = 2000;  // characters of a failed program's output that are shown
+constexpr uint32_t kSpareWatchers = 4;  // beside one of each session's frames
+constexpr size_t kLogTail = 2000;       // characters of a failed program's output that are shown
 
 Status to_status(const grpc::Status& status, const char* call) {
   if (status.ok()) return absl::OkStatus();
@@ -66,10 +68,12 @@ Status write_path(const CameraPath& path, DurationNs start, const std::filesyste
                      : absl::UnavailableError(absl::StrCat("cannot write ", file.string()));
 }
 
-std::string ticket_text(const v1::Ticket& ticket) {
-  std::string text = absl::StrCat("tessera://127.0.0.1:", ticket.meta_port(), "/");
-  for (const unsigned char byte : ticket.token()) absl::StrAppend(&text, absl::Hex(byte, absl::kZeroPad2));
-  return text;
+StatusOr<std::string> ticket_text(const v1::Ticket& made) {
+  client::Ticket ticket{.host = "127.0.0.1", .meta_port = static_cast<uint16_t>(made.meta_port())};
+  if (made.token().size() != ticket.token.size())
+    return absl::InternalError("the ticket's token has a wrong size");
+  std::ranges::copy(made.token(), ticket.token.begin());
+  return client::to_string(ticket);
 }
 
 class RealLoopback {
@@ -117,7 +121,8 @@ Status RealLoopback::start_daemon() {
       Program::start({.file = sibling_program("tesserad"),
                       .arguments = {"--scene", "scene=" + s_.scene, "--device", s_.device, "--control-port",
                                     "0", "--meta-port", "0", "--media-port", "0", "--http-port", "0",
-                                    "--max-sessions", absl::StrCat(s_.sessions), "--log-format", "json"},
+                                    "--max-sessions", absl::StrCat(s_.sessions), "--max-watchers",
+                                    absl::StrCat(s_.sessions + kSpareWatchers), "--log-format", "json"},
                       .log = file("tesserad.log")}));
   while (true) {
     if (const auto line = serving_line(daemon_->output())) {
@@ -157,6 +162,7 @@ Status RealLoopback::start_viewer(uint32_t index) {
   request.mutable_settings()->set_frames_per_second(s_.server_fps);
   TESSERA_RETURN_IF_ERROR(
       to_status(control_->CreateSession(&context, request, &viewer.ticket), "CreateSession"));
+  TESSERA_ASSIGN_OR_RETURN(const std::string ticket, ticket_text(viewer.ticket));
   viewer.frames = std::make_unique<FrameReader>(*control_, viewer.ticket.session());
   std::vector<std::string> arguments{"--path",    file("path.csv"),
                                      "--seconds", absl::StrCat(s_.seconds),
@@ -172,7 +178,7 @@ Status RealLoopback::start_viewer(uint32_t index) {
   TESSERA_ASSIGN_OR_RETURN(viewer.program,
                            Program::start({.file = sibling_program("tessera-client"),
                                            .arguments = arguments,
-                                           .environment = {"TESSERA_TICKET=" + ticket_text(viewer.ticket)},
+                                           .environment = {"TESSERA_TICKET=" + ticket},
                                            .log = file(absl::StrCat("client", index, ".log"))}));
   return absl::OkStatus();
 }
@@ -186,7 +192,7 @@ Status RealLoopback::wait_for_viewers() {
     }
     if (const int code = *viewer.program->exit_code(); code != 0)
       return failed("tessera-client", *viewer.program, code);
-    viewer.records = viewer.frames->finish();
+    TESSERA_ASSIGN_OR_RETURN(viewer.records, viewer.frames->finish());
     viewer.report = json::parse(std::ifstream(file(absl::StrCat("client", i, ".json"))), nullptr, false);
     if (!viewer.report.is_object()) return absl::InternalError("tessera-client left no result");
   }

@@ -175,7 +175,7 @@ void add_checks(CLI::App& app) {
   check("--jitter-ms", CLI::Range(0.0, 10000.0));
   check("--loss", CLI::Range(0.0, 0.5));
   check("--clock", CLI::IsMember({"virtual", "real"}));
-  check("--sessions", CLI::Range(1, 1024));
+  check("--sessions", CLI::Range(1, 1000));
   check("--seed", CLI::NonNegativeNumber);
   check("--score-every", CLI::Range(1, 1'000'000));
   check("--baselines", CLI::IsMember({"plain-video", "mesh-warp", "none"}));

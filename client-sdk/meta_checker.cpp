@@ -123,7 +123,7 @@ Status MetaChecker::check(const MetaFrame& frame) {
     return bad("frame is ", frame.frame, ", not newer than ", *newest_, " before it");
   }
   if (!complete_ && !frame.full_state) {
-    return absl::FailedPreconditionError(
+    return absl::DataLossError(
         absl::StrCat("meta frame ", frame.frame,
                      " builds on a frame that is missing or was damaged; waiting for one with full_state"));
   }

@@ -17,7 +17,7 @@ namespace tessera::client {
 class MetaChecker {
  public:
   // InvalidArgument names the field, the value and the limit; the frame then counts as missing, and until a
-  // frame with full_state every further one is refused with FailedPrecondition.
+  // frame with full_state every further one is refused with DataLoss.
   Status check(const geometry_compression::MetaFrame& frame);
   // A packet that could not even be decoded.
   void on_missing_frame() { complete_ = false; }

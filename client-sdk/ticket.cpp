@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <iterator>
 #include <vector>
 
 namespace tessera::client {
@@ -119,18 +120,27 @@ std::string to_string(const Ticket& ticket) {
 
 StatusOr<std::unique_ptr<Connection>> connect(const Ticket& ticket, const transport::ClientSettings& client,
                                               DurationNs timeout_ns, const Clock& clock) {
-  ConnectionSettings settings{.meta_port = ticket.meta_port,
-                              .token = ticket.token,
-                              .client = client,
-                              .connect_timeout_ns = timeout_ns};
+  const TimeNs give_up = clock.now() + timeout_ns;
+  ConnectionSettings settings{.meta_port = ticket.meta_port, .token = ticket.token, .client = client};
   if (ticket.authority_file) {
     TESSERA_ASSIGN_OR_RETURN(settings.tls,
                              transport::TlsContext::client({*ticket.authority_file, ticket.host}));
   }
   TESSERA_ASSIGN_OR_RETURN(const std::vector<std::string> addresses, resolve(ticket.host));
+  settings.connect_timeout_ns = give_up - clock.now();
+  if (settings.connect_timeout_ns <= 0)
+    return absl::DeadlineExceededError(
+        absl::StrCat("resolve `", ticket.host, "`: that alone took ", to_seconds(timeout_ns), " s"));
+  return connect_to_first(addresses, settings, clock);
+}
+
+StatusOr<std::unique_ptr<Connection>> connect_to_first(std::span<const std::string> addresses,
+                                                       ConnectionSettings settings, const Clock& clock) {
+  const TimeNs give_up = clock.now() + settings.connect_timeout_ns;
   Status failure;
-  for (const std::string& address : addresses) {
-    settings.server_address = address;
+  for (; !addresses.empty(); addresses = addresses.subspan(1)) {
+    settings.server_address = addresses.front();
+    settings.connect_timeout_ns = std::max<DurationNs>(give_up - clock.now(), 0) / std::ssize(addresses);
     auto connection = Connection::connect(settings, clock);
     if (connection.ok()) return connection;
     failure = connection.status();

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "base/status.h"
@@ -35,8 +36,12 @@ StatusOr<Ticket> parse_ticket(absl::string_view text);
 std::string to_string(const Ticket& ticket);
 
 // Connection::connect() to the first of the host's addresses that answers; blocks. The error names the step
-// (certificate, resolve, or as there). Each address has `timeout_ns`.
+// (certificate, resolve, or as there). `timeout_ns` is for everything together.
 StatusOr<std::unique_ptr<Connection>> connect(const Ticket& ticket, const transport::ClientSettings& client,
                                               DurationNs timeout_ns, const Clock& clock);
+// To the first of these, one at least; connect_timeout_ns is for all together, shared out evenly: one that a
+// firewall swallows leaves time for the rest.
+StatusOr<std::unique_ptr<Connection>> connect_to_first(std::span<const std::string> addresses,
+                                                       ConnectionSettings settings, const Clock& clock);
 
 }  // namespace tessera::client

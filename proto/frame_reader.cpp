@@ -1,24 +1,31 @@
 #include "proto/frame_reader.h"
 
+#include <chrono>
 #include <utility>
 
 #include "proto/frame_record.h"
 
 namespace tessera {
+namespace {
+
+constexpr std::chrono::seconds kRestTimeout{10};
+
+}  // namespace
 
 FrameReader::FrameReader(v1::Control::Stub& control, uint64_t session)
-    : control_(control), session_(session), thread_([this] { read(watching_, false); }) {}
+    : control_(control), session_(session), thread_([this] { watched_ = read(watching_, false); }) {}
 
 FrameReader::~FrameReader() {
   stop();
 }
 
 void FrameReader::stop() {
+  stopping_ = true;
   watching_.TryCancel();
   if (thread_.joinable()) thread_.join();
 }
 
-void FrameReader::read(grpc::ClientContext& context, bool once) {
+Status FrameReader::read(grpc::ClientContext& context, bool once) {
   v1::WatchFramesRequest request;
   request.set_session(session_);
   request.set_first(next_);
@@ -28,13 +35,19 @@ void FrameReader::read(grpc::ClientContext& context, bool once) {
     records_.push_back(tessera::read(record));
     next_ = record.index() + 1;
   }
-  (void)reader->Finish();  // the session's end, or stop()
+  const grpc::Status end = reader->Finish();
+  const bool stopped = end.error_code() == grpc::StatusCode::CANCELLED && stopping_ && !once;
+  if (end.ok() || stopped) return absl::OkStatus();
+  return {static_cast<absl::StatusCode>(end.error_code()),
+          absl::StrCat("WatchFrames of session ", session_, ": ", end.error_message())};
 }
 
-std::vector<FrameRecord> FrameReader::finish() {
+StatusOr<std::vector<FrameRecord>> FrameReader::finish() {
   stop();
+  TESSERA_RETURN_IF_ERROR(watched_);
   grpc::ClientContext context;
-  read(context, true);
+  context.set_deadline(std::chrono::system_clock::now() + kRestTimeout);
+  TESSERA_RETURN_IF_ERROR(read(context, true));
   return std::move(records_);
 }
 

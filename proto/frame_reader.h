@@ -3,12 +3,14 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "base/frame_record.h"
+#include "base/status.h"
 #include "tessera/v1/control.grpc.pb.h"
 
 namespace tessera {
@@ -22,17 +24,19 @@ class FrameReader {
   FrameReader& operator=(const FrameReader&) = delete;
 
   // All records so far, those included that the daemon has not sent yet. Call it once, while the session
-  // lives.
-  std::vector<FrameRecord> finish();
+  // lives. Errors are those of WatchFrames: records are all there, or none is returned.
+  StatusOr<std::vector<FrameRecord>> finish();
 
  private:
-  void read(grpc::ClientContext& context, bool once);
+  Status read(grpc::ClientContext& context, bool once);
   void stop();
 
   v1::Control::Stub& control_;
   const uint64_t session_;
   uint64_t next_ = 0;  // index
   std::vector<FrameRecord> records_;
+  Status watched_;  // how watching ended
+  std::atomic<bool> stopping_ = false;
   grpc::ClientContext watching_;
   std::thread thread_;  // last: it uses all of the above
 };

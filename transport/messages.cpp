@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "base/utf8.h"
 #include "transport/byte_io.h"
 
 namespace tessera::transport {
@@ -24,7 +25,8 @@ constexpr TimeNs ClientFrameTimes::*kTimesOnTheWire[] = {
     &ClientFrameTimes::clock_error};
 
 Status malformed(const char* what) {
-  return absl::InvalidArgumentError(absl::StrCat(what, " message: wrong length, or a value out of range"));
+  return absl::InvalidArgumentError(
+      absl::StrCat(what, " message: wrong length, a value out of range, or a text that is not UTF-8"));
 }
 
 Status other_version(const char* what, uint16_t version) {
@@ -34,7 +36,7 @@ Status other_version(const char* what, uint16_t version) {
 }
 
 void write_text(ByteWriter& w, std::string_view text, size_t limit) {
-  text = text.substr(0, limit);
+  text = utf8_prefix(text.substr(0, limit));
   w.u16(static_cast<uint16_t>(text.size()));
   w.bytes({reinterpret_cast<const uint8_t*>(text.data()), text.size()});
 }
@@ -43,7 +45,9 @@ std::string read_text(ByteReader& in, size_t limit) {
   const size_t length = in.u16();
   if (length > limit) in.fail();
   const auto bytes = in.bytes(length);
-  return {bytes.begin(), bytes.end()};
+  std::string text(bytes.begin(), bytes.end());
+  if (utf8_prefix(text).size() != text.size()) in.fail();
+  return text;
 }
 
 template <size_t N>

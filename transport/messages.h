@@ -1,5 +1,6 @@
 // The payloads of TCP frames (frame_io.h): fixed layouts, big-endian (docs/protocol.md). Parsers are safe for
-// untrusted input: another length, a text that is too long or a value out of range is InvalidArgument.
+// untrusted input: another length, a text that is too long or no UTF-8, or a value out of range is
+// InvalidArgument.
 #pragma once
 
 #include <array>
@@ -74,6 +75,7 @@ enum class ErrorCode : uint16_t {
   malformed = 3,
   too_slow = 4,  // the peer did not take its data
   full = 5,      // no room for another session or connection
+  busy = 6,      // the session has a client already
 };
 struct ErrorMessage {
   ErrorCode code = ErrorCode::internal;
@@ -83,7 +85,7 @@ struct ByeMessage {
   std::string reason;  // up to kMaxReasonBytes
 };
 
-// Texts that are too long are cut.
+// Texts that are too long are cut behind a character, and where they stop being UTF-8.
 std::vector<uint8_t> encode(const Hello& m);
 std::vector<uint8_t> encode(const Welcome& m);
 std::vector<uint8_t> encode(const SequencedPose& m);

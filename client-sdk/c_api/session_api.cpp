@@ -1,9 +1,11 @@
 // Sessions, events, poses and frames in C.
 #include <algorithm>
 
+#include "base/utf8.h"
 #include "client-sdk/c_api/handles.h"
 #include "client-sdk/c_api/wall.h"
 #include "client-sdk/session.h"
+#include "transport/wire_pose.h"
 
 namespace {
 
@@ -30,6 +32,8 @@ StatusOr<transport::ClientSettings> client_settings(const TesseraSessionCreateIn
   if (name.size() > transport::kMaxNameBytes)
     return absl::InvalidArgumentError(
         absl::StrCat("info->applicationName is longer than ", transport::kMaxNameBytes, " bytes"));
+  if (utf8_prefix(name).size() != name.size())
+    return absl::InvalidArgumentError("info->applicationName is not UTF-8");
   return transport::ClientSettings{.width = static_cast<uint16_t>(info.viewWidth),
                                    .height = static_cast<uint16_t>(info.viewHeight),
                                    .fov = fov,
@@ -57,6 +61,14 @@ StatusOr<TesseraSession> create_session(const TesseraSessionCreateInfo* info) {
   TESSERA_ASSIGN_OR_RETURN(const transport::ClientSettings client, client_settings(*info));
   TESSERA_ASSIGN_OR_RETURN(const DurationNs timeout, connect_timeout(*info));
   return new TesseraSession_T(ticket, client, timeout);
+}
+
+// What the wire takes; of the wall clock, nanoseconds are beyond it.
+Status check_time(int64_t time, const char* name) {
+  if (transport::is_sane(time)) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(name, " is ", time,
+                                                 " ns, which is not within ±2^60: give times of the clock "
+                                                 "of tesseraGetTime()"));
 }
 
 // False, and nothing happens, if it would not grow.
@@ -92,10 +104,14 @@ TesseraEventKind kind_of(SessionEvent::Kind kind) {
   return TESSERA_EVENT_STATE_CHANGED;
 }
 
+TesseraResult why_lost(const Status& reason) {
+  return absl::IsFailedPrecondition(reason) ? TESSERA_ERROR_BUSY : result_of(reason);
+}
+
 void fill(TesseraEvent& out, const SessionEvent& event) {
   out.kind = kind_of(event.kind);
   out.state = state_of(event.state);
-  out.result = result_of(event.reason);
+  out.result = why_lost(event.reason);
   out.frame = event.frame;
   const absl::string_view text = event.reason.message();
   const size_t size = std::min(text.size(), sizeof(out.reason) - 1);
@@ -148,7 +164,9 @@ TesseraResult tesseraSendPose(TesseraSession session, const TesseraPoseInfo* inf
     TESSERA_FAIL_IF_ERROR(check_struct(info, TESSERA_TYPE_POSE_INFO, "info"));
     const auto pose = pose_of(info->pose, "info->pose");
     TESSERA_FAIL_IF_ERROR(pose.status());
-    TESSERA_FAIL_IF_ERROR(session->session.status());
+    TESSERA_FAIL_IF_ERROR(check_time(info->predictedDisplayTime, "info->predictedDisplayTime"));
+    if (const Status lost = session->session.status(); !lost.ok())
+      return failure(why_lost(lost), lost.message());
     if (!advance(session->newest_pose_time, info->predictedDisplayTime))
       return failure(TESSERA_ERROR_VALIDATION,
                      "info->predictedDisplayTime is not later than that of the pose before");
@@ -194,6 +212,7 @@ TesseraResult tesseraAcquireFrame(TesseraSession session, TesseraFrameInfo* info
 TesseraResult tesseraReportDisplayed(TesseraSession session, uint32_t frame, int64_t displayTime) {
   return guarded([&] {
     if (session == nullptr) return null_session();
+    TESSERA_FAIL_IF_ERROR(check_time(displayTime, "displayTime"));
     session->session.report_displayed(frame, displayTime);
     return TESSERA_SUCCESS;
   });

@@ -4,6 +4,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
+#include <chrono>
 #include <fstream>
 #include <sstream>
 
@@ -12,6 +13,12 @@
 
 namespace tessera::client {
 namespace {
+
+constexpr std::chrono::seconds kCallTimeout{10};
+
+void limit(grpc::ClientContext& context) {
+  context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
+}
 
 Status to_status(const grpc::Status& status) {
   return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
@@ -63,6 +70,7 @@ StatusOr<std::unique_ptr<ControlledSession>> ControlledSession::create(const Con
   session->stub_ =
       v1::Control::NewStub(control_channel(settings.endpoint, channel_credentials, control_token));
   grpc::ClientContext context;
+  limit(context);
   v1::CreateSessionRequest request;
   request.set_scene(scene);
   v1::Ticket made;
@@ -82,6 +90,7 @@ StatusOr<std::unique_ptr<ControlledSession>> ControlledSession::create(const Con
 
 StatusOr<v1::Box> ControlledSession::bounds() {
   grpc::ClientContext context;
+  limit(context);
   v1::ListScenesResponse scenes;
   TESSERA_RETURN_IF_ERROR(to_status(stub_->ListScenes(&context, {}, &scenes)));
   for (const v1::Scene& scene : scenes.scenes())
@@ -93,13 +102,15 @@ void ControlledSession::record_frames() {
   reader_ = std::make_unique<FrameReader>(*stub_, id_);
 }
 
-std::vector<FrameRecord> ControlledSession::frames() {
-  return reader_ ? reader_->finish() : std::vector<FrameRecord>();
+StatusOr<std::vector<FrameRecord>> ControlledSession::frames() {
+  if (!reader_) return std::vector<FrameRecord>();
+  return reader_->finish();
 }
 
 ControlledSession::~ControlledSession() {
   if (id_ == 0 || kept_) return;
   grpc::ClientContext context;
+  limit(context);
   v1::DeleteSessionRequest request;
   request.set_session(id_);
   v1::DeleteSessionResponse response;

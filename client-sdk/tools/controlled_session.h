@@ -27,12 +27,13 @@ class ControlledSession {
   ~ControlledSession();
 
   const Ticket& ticket() const { return ticket_; }
+  uint64_t id() const { return id_; }
   void keep() { kept_ = true; }
   // Of the scene.
   StatusOr<v1::Box> bounds();
   // From now on, for frames().
   void record_frames();
-  std::vector<FrameRecord> frames();
+  StatusOr<std::vector<FrameRecord>> frames();
 
  private:
   ControlledSession() = default;

@@ -182,6 +182,13 @@ Status print_ticket(const Settings& s) {
   TESSERA_ASSIGN_OR_RETURN(const auto session, client::ControlledSession::create(s.control, s.scene));
   session->keep();
   std::cout << client::to_string(session->ticket()) << std::endl;
+  std::string tls = " -plaintext";
+  if (s.control.authority_file)
+    tls = s.control.authority_file->empty() ? "" : absl::StrCat(" -cacert ", *s.control.authority_file);
+  std::cerr << absl::StrFormat(
+      "session %u stays until it is deleted: grpcurl%s -d '{\"session\": %u}' %s "
+      "tessera.v1.Control/DeleteSession\n",
+      session->id(), tls, session->id(), s.control.endpoint);
   return absl::OkStatus();
 }
 
@@ -221,7 +228,10 @@ StatusOr<nlohmann::json> view(const Settings& s) {
   Viewer viewer(s, std::move(head), *connection, *display, writer.get(), clock);
   TESSERA_RETURN_IF_ERROR(viewer.run());
   if (writer) TESSERA_RETURN_IF_ERROR(writer->finish());
-  if (session) TESSERA_RETURN_IF_ERROR(write_frames(s, session->frames()));
+  if (session) {
+    TESSERA_ASSIGN_OR_RETURN(const std::vector<FrameRecord> frames, session->frames());
+    TESSERA_RETURN_IF_ERROR(write_frames(s, frames));
+  }
   const client::ConnectionStats stats = connection->stats();
   const Totals& totals = viewer.totals();
   return nlohmann::json{{"frames_displayed", totals.displayed},

@@ -65,12 +65,15 @@ TEST(Log, HostileTextStaysInItsField) {
         "session\x1f"
         "9";
     for (char c = 1; c < 0x20; ++c) hostile += c;
+    const std::string c1 = "\xc2\x9b";  // CSI, which some terminals obey
     const std::string text = logged([&] {
-      log_event(spdlog::level::info, "event", {{"name", hostile}, {"load", std::nan("")}});
+      log_event(spdlog::level::info, "event",
+                {{"name", hostile}, {"c1", c1}, {"broken", "\x9b"}, {"load", std::nan("")}});
       spdlog::info("plain\nerror forged");
     });
     EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 2) << text;
     EXPECT_EQ(std::count(text.begin(), text.end(), '\x1b'), 0) << text;
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\x9b'), 0) << text;
     if (format == LogFormat::text) continue;
     std::istringstream in(text);
     for (std::string line; std::getline(in, line);) {

@@ -54,7 +54,10 @@ bool show_until(tessera::Session& session, std::vector<TesseraEvent>& events, co
     if (done()) return true;
     while (const auto event = session.poll_event()) events.push_back(*event);
     if (!events.empty() && events.back().state == TESSERA_SESSION_LOST) return false;
-    session.send_pose(kHead, tesseraGetTime());
+    auto pose = make<TesseraPoseInfo>();
+    pose.pose = kHead;
+    pose.predictedDisplayTime = tesseraGetTime();
+    (void)tesseraSendPose(session.get(), &pose);  // the next event tells if the session was lost meanwhile
     std::this_thread::sleep_for(std::chrono::milliseconds(5));  // the display's rate
   }
   return false;
@@ -114,6 +117,7 @@ TEST(CApi, WrongCreateInfosAreNamed) {
   expect(kWrong, "connectTimeout", [](Info& i) { i.connectTimeout = -1; });
   const std::string long_name(65, 'x');
   expect(kWrong, "applicationName", [&](Info& i) { i.applicationName = long_name.c_str(); });
+  expect(kWrong, "not UTF-8", [](Info& i) { i.applicationName = "caf\xe9"; });
 }
 
 TEST(CApi, ARefusedConnectionIsLostAndNamesTheStep) {
@@ -153,6 +157,23 @@ TEST_F(CApiSession, AnUnknownTokenIsRefused) {
   ASSERT_FALSE(events.empty());
   EXPECT_EQ(events.back().result, TESSERA_ERROR_REFUSED);
   EXPECT_THAT(events.back().reason, HasSubstr("hello"));
+}
+
+TEST_F(CApiSession, ASecondAppIsToldThatTheSessionIsBusy) {
+  const std::string ticket = ticket_text();
+  tessera::Session first(create_info(ticket));
+  std::vector<TesseraEvent> events;
+  ASSERT_TRUE(show_until(first, events, [&] { return first.statistics().frames > 0; }));
+  tessera::Session second(create_info(ticket));
+  events.clear();
+  show_until(second, events, [] { return false; });
+  ASSERT_FALSE(events.empty());
+  EXPECT_EQ(events.back().state, TESSERA_SESSION_LOST);
+  EXPECT_EQ(events.back().result, TESSERA_ERROR_BUSY);
+  EXPECT_THAT(events.back().reason, HasSubstr("has a client already"));
+  auto pose = make<TesseraPoseInfo>();
+  pose.pose = kHead;
+  EXPECT_EQ(tesseraSendPose(second.get(), &pose), TESSERA_ERROR_BUSY);
 }
 
 TEST_F(CApiSession, EventsComeInOrderFromConnectingToTheServersReason) {
@@ -207,6 +228,13 @@ TEST_F(CApiSession, WrongPosesAreNamedAndChangeNothing) {
   expect("position", {{0, 2e9, 0}, {0, 0, 0, 1}}, now + 100);
   expect("position", {{0, NAN, 0}, {0, 0, 0, 1}}, now + 100);
   expect("predictedDisplayTime", kHead, now);
+  constexpr int64_t kWallClock = 1'800'000'000'000'000'000;
+  for (const int64_t time : {kWallClock, -kWallClock, (int64_t{1} << 60) + 1, INT64_MAX, INT64_MIN}) {
+    expect("info->predictedDisplayTime is " + std::to_string(time), kHead, time);
+    EXPECT_THAT(last_error(), HasSubstr("tesseraGetTime()"));
+    EXPECT_EQ(tesseraReportDisplayed(session.get(), 1, time), TESSERA_ERROR_VALIDATION);
+    EXPECT_THAT(last_error(), HasSubstr("displayTime is " + std::to_string(time)));
+  }
   EXPECT_EQ(session.send_pose(kHead, now + 1), TESSERA_SUCCESS);
 }
 

@@ -154,7 +154,7 @@ TEST(ClientCore, ADamagedMetaPacketIsAnErrorThatLastsUntilFullState) {
   const Status status = core->on_meta(std::span(stream[1].meta).first(stream[1].meta.size() / 2)).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(status.message()), HasSubstr("meta packet of"));
-  EXPECT_EQ(core->on_meta(stream[2].meta).status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(core->on_meta(stream[2].meta).status().code(), absl::StatusCode::kDataLoss);
   for (uint32_t i = 0; i < 4; ++i) ASSERT_TRUE(core->on_atlas(stream[i].atlas).ok());
   EXPECT_EQ(take(*core), 0u);
 

@@ -53,7 +53,8 @@ TEST_F(EmbedTest, TheExampleBuiltByFindPackageShowsASession) {
             0)
       << output_;
   const std::string picture = (folder_ / "eyes.ppm").string();
-  ASSERT_EQ(run(build + "/embed " + to_string(new_ticket()) + " " + picture), 0) << output_;
+  ASSERT_EQ(run("TESSERA_TICKET='" + to_string(new_ticket()) + "' " + build + "/embed " + picture), 0)
+      << output_;
   EXPECT_NE(output_.find("first: frame "), std::string::npos) << output_;
   EXPECT_NE(output_.find("30 frames drawn"), std::string::npos) << output_;
 

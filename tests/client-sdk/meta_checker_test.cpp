@@ -30,7 +30,7 @@ TEST(MetaChecker, StartsOnlyWithAFullState) {
   MetaChecker checker;
   MetaFrame frame = first_frame(1);
   frame.full_state = false;
-  EXPECT_EQ(checker.check(frame).code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(checker.check(frame).code(), absl::StatusCode::kDataLoss);
   frame.full_state = true;
   EXPECT_TRUE(checker.check(frame).ok());
 }
@@ -64,7 +64,7 @@ TEST_P(Hostile, IsRefusedByNameAndEndsTheStateUntilFullState) {
     const Status status = checker.check(frame);
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
     EXPECT_THAT(std::string(status.message()), HasSubstr(GetParam().named));
-    EXPECT_EQ(checker.check(next_frame(3)).code(), absl::StatusCode::kFailedPrecondition);
+    EXPECT_EQ(checker.check(next_frame(3)).code(), absl::StatusCode::kDataLoss);
     EXPECT_TRUE(checker.check(first_frame(4)).ok());
     EXPECT_TRUE(checker.check(next_frame(5)).ok());
   }

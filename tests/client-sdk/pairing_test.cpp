@@ -202,7 +202,7 @@ TEST(Pairing, ADamagedMetaEndsTheStateUntilAFullState) {
   EXPECT_EQ(bench.take(), 0u);
   bench.pairing().on_damaged_meta();
   ASSERT_TRUE(bench.atlas(1).ok());
-  EXPECT_EQ(bench.meta(2).code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(bench.meta(2).code(), absl::StatusCode::kDataLoss);
   ASSERT_TRUE(bench.atlas(2).ok());
   EXPECT_EQ(bench.take(), std::nullopt);
   ASSERT_TRUE(bench.full_state(3).ok());

@@ -3,11 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+
 #include "base/time.h"
 
 namespace tessera::client {
 namespace {
 
+using boost::asio::ip::tcp;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -88,6 +92,43 @@ TEST(Ticket, ConnectingNamesTheStepThatFailed) {
   EXPECT_THAT(failure(with_token("tessera://nowhere.invalid:1/")), HasSubstr("resolve `nowhere.invalid`"));
   EXPECT_THAT(failure(with_token("tessera://127.0.0.1:1/")), HasSubstr("127.0.0.1:1: connect: "));
   EXPECT_THAT(failure(with_token("tessera://127.0.0.1:1/", "?ca=/no/such.pem")), HasSubstr("/no/such.pem"));
+}
+
+// Answers no connect any more, as behind a firewall: its queue is full.
+class Hole {
+ public:
+  explicit Hole(const char* address, uint16_t port = 0) {
+    acceptor_.open(tcp::v4());
+    acceptor_.bind({boost::asio::ip::make_address(address), port});
+    acceptor_.listen(0);
+    filler_.connect(acceptor_.local_endpoint());
+  }
+  uint16_t port() const { return acceptor_.local_endpoint().port(); }
+
+ private:
+  boost::asio::io_context io_;
+  tcp::acceptor acceptor_{io_};
+  tcp::socket filler_{io_};
+};
+
+TEST(Ticket, AnAddressThatSwallowsConnectsLeavesTimeForTheNext) {
+  const SteadyClock clock;
+  const Hole hole("127.0.0.2");
+  ConnectionSettings settings{.meta_port = hole.port(), .connect_timeout_ns = kNsPerSecond};
+  settings.client = {.width = 16, .height = 16, .display_hz = 60};
+  const auto failure = [&](const std::vector<std::string>& addresses) {
+    return connect_to_first(addresses, settings, clock).status();
+  };
+  const Status refused = failure({"127.0.0.2", "127.0.0.3"});
+  EXPECT_TRUE(absl::IsUnavailable(refused)) << refused;
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("TCP 127.0.0.3:"));
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("connect: "));
+
+  const Hole next("127.0.0.3", hole.port());
+  const Status silence = failure({"127.0.0.2", "127.0.0.3"});
+  EXPECT_THAT(std::string(silence.message()), HasSubstr("TCP 127.0.0.3:"));
+  EXPECT_THAT(std::string(silence.message()), HasSubstr("no answer to connect for 0."))
+      << "not a second each";
 }
 
 }  // namespace

@@ -3,12 +3,19 @@
 
 #include <sys/wait.h>
 
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/read.hpp>
+#include <boost/asio/write.hpp>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "daemon_fixture.h"
+#include "proto/frame_reader.h"
+#include "transport/asio/asio.h"
+#include "transport/frame_io.h"
+#include "transport/messages.h"
 
 namespace tessera::server {
 namespace {
@@ -90,6 +97,33 @@ TEST_F(DaemonTest, WatchersOfFramesGetEachRecordOnce) {
   EXPECT_TRUE(watch(1u << 30, true, 1000).empty());
 }
 
+TEST_F(DaemonTest, AFrameReaderTellsWhyItHasNoRecords) {
+  start({.max_watchers = 2, .scenes = {"hall=gallery:0"}});
+  v1::Ticket ticket;
+  ASSERT_TRUE(create("hall", &ticket).ok());
+  const auto read = [&](uint64_t session) { return FrameReader(*control_, session).finish().status(); };
+  {
+    grpc::ClientContext contexts[2];
+    std::unique_ptr<grpc::ClientReader<v1::Session>> watchers[2];
+    v1::WatchSessionRequest request;
+    request.set_session(ticket.session());
+    for (int i = 0; i < 2; ++i) {
+      watchers[i] = control_->WatchSession(&contexts[i], request);
+      v1::Session session;
+      ASSERT_TRUE(watchers[i]->Read(&session));
+    }
+    const Status refused = read(ticket.session());
+    EXPECT_TRUE(absl::IsResourceExhausted(refused)) << refused;
+    for (int i = 0; i < 2; ++i) {
+      contexts[i].TryCancel();
+      (void)watchers[i]->Finish();
+    }
+  }
+  // The server takes a moment to notice that a watcher has left.
+  EXPECT_TRUE(eventually([&] { return absl::IsNotFound(read(99)); }));
+  EXPECT_TRUE(eventually([&] { return read(ticket.session()).ok(); })) << "none yet is no error";
+}
+
 TEST_F(DaemonTest, WatchersSeeTheSessionUntilItEnds) {
   start({.scenes = {"hall=gallery:0"}});
   v1::Ticket ticket;
@@ -109,6 +143,39 @@ TEST_F(DaemonTest, WatchersSeeTheSessionUntilItEnds) {
   while (reader->Read(&session)) {
   }
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::NOT_FOUND);
+}
+
+// protobuf's texts are UTF-8: one that is not would take everybody's answer with it.
+TEST_F(DaemonTest, AClientsGarbledByeLeavesSessionsReadable) {
+  start({.scenes = {"hall=gallery:0"}});
+  v1::Ticket ticket;
+  ASSERT_TRUE(create("hall", &ticket).ok());
+  const client::ConnectionSettings settings = connection_settings(ticket);
+  const std::vector<uint8_t> hello =
+      transport::encode(transport::Hello{.token = settings.token, .client = settings.client});
+  std::vector<uint8_t> frames;
+  ASSERT_TRUE(transport::write_frame(transport::FrameType::hello, hello, frames).ok());
+  const uint8_t garbled[] = {0, 1, 0xff};
+  ASSERT_TRUE(transport::write_frame(transport::FrameType::bye, garbled, frames).ok());
+  namespace asio = transport::asio;
+  asio::io_context io;
+  asio::ip::tcp::socket socket(io);
+  socket.connect({asio::ip::address_v4::loopback(), settings.meta_port});
+  asio::write(socket, asio::buffer(frames));
+  std::vector<uint8_t> answer(4096);
+  transport::SystemError end;
+  asio::read(socket, asio::buffer(answer), end);  // until the server closes
+
+  v1::ListSessionsResponse sessions;
+  EXPECT_TRUE(eventually([&] {
+    grpc::ClientContext context;
+    const grpc::Status status = control_->ListSessions(&context, {}, &sessions);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return !status.ok() || (sessions.sessions_size() == 1 && !sessions.sessions(0).last_client_end().empty());
+  }));
+  ASSERT_EQ(sessions.sessions_size(), 1);
+  EXPECT_NE(sessions.sessions(0).last_client_end().find("UTF-8"), std::string::npos)
+      << sessions.sessions(0).last_client_end();
 }
 
 TEST_F(DaemonTest, RefusalsNameWhatIsWrong) {

@@ -311,6 +311,7 @@ TEST_F(StreamServerTest, ASessionHasOneClientAtATime) {
   ASSERT_TRUE(client.ok()) << client.status();
   const auto second = connect(shared);
   ASSERT_FALSE(second.ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(second.status())) << second.status();
   EXPECT_NE(std::string(second.status().message()).find("has a client already"), std::string::npos)
       << second.status();
   expect_pairs(**client, 2);

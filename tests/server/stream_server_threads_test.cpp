@@ -21,7 +21,7 @@ class StreamServerThreadsTest : public test::FakeStreamingTest {
   std::unique_ptr<client::Connection> connect_again(const SessionTicket& ticket) {
     const TimeNs give_up = clock_.now() + test::kPatienceNs;
     auto client = connect(ticket);
-    while (absl::IsInternal(client.status()) && clock_.now() < give_up) client = connect(ticket);
+    while (absl::IsFailedPrecondition(client.status()) && clock_.now() < give_up) client = connect(ticket);
     EXPECT_TRUE(client.ok()) << client.status();
     return client.ok() ? *std::move(client) : nullptr;
   }

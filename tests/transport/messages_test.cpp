@@ -149,6 +149,35 @@ TEST(Messages, OtherVersionsAreNamed) {
 
 TEST(Messages, LongTextsAreCut) {
   EXPECT_EQ(decode_bye(encode(ByeMessage{std::string(5000, 'x')}))->reason.size(), kMaxReasonBytes);
+  std::string text = "x";  // so that the limit falls amid a character
+  for (int i = 0; i < 600; ++i) text += "ü";
+  EXPECT_EQ(encode(ByeMessage{text}).size(), 2 + kMaxReasonBytes - 1);
+  EXPECT_EQ(decode_bye(encode(ByeMessage{text}))->reason, text.substr(0, kMaxReasonBytes - 1));
+}
+
+TEST(Messages, TextsAreUtf8) {
+  const auto is_read = [](const char* hex) {
+    const Bytes text = from_hex(hex);
+    Bytes bye{0, static_cast<uint8_t>(text.size())}, error{0, 1};
+    bye.insert(bye.end(), text.begin(), text.end());
+    error.insert(error.end(), bye.begin(), bye.end());
+    EXPECT_EQ(decode_bye(bye).ok(), decode_error(error).ok());
+    return decode_bye(bye).ok();
+  };
+  for (const char* good :
+       {"", "00", "7f", "c280", "dfbf", "e0a080", "ed9fbf", "ee8080", "efbfbf", "f0908080", "f48fbfbf"})
+    EXPECT_TRUE(is_read(good)) << good;
+  for (const char* bad : {"ff",       "fe",       "80",         "bf",          "61ff62",
+                          "c3",       "c328",     "e282",       "e28228",      "f09f98",  // cut
+                          "c080",     "c1bf",     "e09fbf",     "f08fbfbf",       // longer than need be
+                          "eda080",   "edbfbf",                                   // surrogates
+                          "f4908080", "f5808080", "f888808080", "fc8480808080"})  // beyond U+10FFFF
+    EXPECT_FALSE(is_read(bad)) << bad;
+  Hello hello = some_hello();
+  hello.client.name = "viewér";
+  EXPECT_EQ(decode_hello(encode(hello))->client.name, "viewér");
+  EXPECT_EQ(decode_bye(encode(ByeMessage{"cannot open caf\xe9.pem"}))->reason, "cannot open caf")
+      << "what is no text ends where it stops being one";
 }
 
 }  // namespace

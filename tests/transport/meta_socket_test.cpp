@@ -156,6 +156,19 @@ TEST_F(MetaSockets, FailuresNameTheStep) {
   EXPECT_THAT(std::string(connected->status().message()), HasSubstr("connect"));
 }
 
+TEST(MetaConnection, ErrorsKeepTheirMeaningOnTheWire) {
+  for (const auto code :
+       {absl::StatusCode::kInternal, absl::StatusCode::kUnauthenticated, absl::StatusCode::kUnimplemented,
+        absl::StatusCode::kInvalidArgument, absl::StatusCode::kDeadlineExceeded,
+        absl::StatusCode::kResourceExhausted, absl::StatusCode::kFailedPrecondition}) {
+    const auto sent = encode(ErrorMessage{error_code(Status(code, "why")), "why"});
+    EXPECT_EQ(to_status(*decode_error(sent)).code(), code);
+  }
+  EXPECT_EQ(error_code(absl::FailedPreconditionError("")), ErrorCode::busy);
+  EXPECT_EQ(error_code(absl::NotFoundError("the session has ended")), ErrorCode::bad_token);
+  EXPECT_EQ(to_status({static_cast<ErrorCode>(77), "newer"}).code(), absl::StatusCode::kInternal);
+}
+
 TEST_F(MetaSockets, ABusyPortSaysWhatWhereAndWhatToDo) {
   listen();
   const Status status = MetaListener::open(io.get_executor(), {.port = listener->port()}, {}).status();

@@ -103,8 +103,11 @@ class Attempt : public std::enable_shared_from_this<Attempt> {
     socket_.close(ignored);
     if (stream_) stream_->close();
     if (connection_) connection_->close(absl::DeadlineExceededError("no welcome within the time for it"));
-    fail(absl::DeadlineExceededError(absl::StrCat(where(), ": no answer to ", step_, " for ",
-                                                  to_seconds(settings_.connect_timeout_ns), " s", advice())));
+    // Nobody there, as when the system itself gives up on a connect.
+    const auto code =
+        step_ == "connect" ? absl::StatusCode::kUnavailable : absl::StatusCode::kDeadlineExceeded;
+    fail(Status(code, absl::StrCat(where(), ": no answer to ", step_, " for ",
+                                   to_seconds(settings_.connect_timeout_ns), " s", advice())));
   }
 
   void fail_step(const std::string& why) {

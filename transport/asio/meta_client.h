@@ -23,7 +23,8 @@ struct MetaClientSettings {
 };
 
 // The result comes once: the connection and the server's welcome, or an error that names the step that failed
-// (connect, TLS, hello). Then frames go to `events`; a failed connect calls none of them. Everything runs on
+// (connect, TLS, hello). Unavailable: no tesserad is there; DeadlineExceeded: it was reached, and then said
+// nothing for too long. Then frames go to `events`; a failed connect calls none of them. Everything runs on
 // a strand of `executor`.
 using OnWelcome = std::function<void(StatusOr<std::shared_ptr<MetaConnection>>, const Welcome&)>;
 void connect_meta(asio::any_io_executor executor, const MetaClientSettings& settings,

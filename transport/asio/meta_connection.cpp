@@ -14,6 +14,7 @@ ErrorCode error_code(const Status& status) {
   switch (status.code()) {
     case absl::StatusCode::kUnauthenticated:
     case absl::StatusCode::kPermissionDenied:
+    case absl::StatusCode::kNotFound:  // the session has ended, and its token with it
       return ErrorCode::bad_token;
     case absl::StatusCode::kUnimplemented:
       return ErrorCode::unsupported_version;
@@ -23,6 +24,8 @@ ErrorCode error_code(const Status& status) {
       return ErrorCode::too_slow;
     case absl::StatusCode::kResourceExhausted:
       return ErrorCode::full;
+    case absl::StatusCode::kFailedPrecondition:
+      return ErrorCode::busy;
     default:
       return ErrorCode::internal;
   }
@@ -41,6 +44,8 @@ Status to_status(const ErrorMessage& message) {
       return absl::DeadlineExceededError(text);
     case ErrorCode::full:
       return absl::ResourceExhaustedError(text);
+    case ErrorCode::busy:
+      return absl::FailedPreconditionError(text);
     default:
       return absl::InternalError(text);
   }
@@ -86,13 +91,11 @@ void MetaConnection::on_read(SystemError error, size_t bytes) {
 
 Status MetaConnection::on_frame(FrameType type, std::span<const uint8_t> payload) {
   if (type == FrameType::bye) {
-    const auto message = decode_bye(payload);
-    finish(!message.ok()             ? message.status()
-           : message->reason.empty() ? absl::OkStatus()
-                                     : absl::CancelledError(message->reason));
+    TESSERA_ASSIGN_OR_RETURN(const ByeMessage message, decode_bye(payload));
+    finish(message.reason.empty() ? absl::OkStatus() : absl::CancelledError(message.reason));
   } else if (type == FrameType::error) {
-    const auto message = decode_error(payload);
-    finish(message.ok() ? to_status(*message) : message.status());
+    TESSERA_ASSIGN_OR_RETURN(const ErrorMessage message, decode_error(payload));
+    finish(to_status(message));
   } else {
     return events_.on_frame ? events_.on_frame(type, payload) : absl::OkStatus();
   }

@@ -1,6 +1,9 @@
-// Watches a Tessera session with two eyes, and writes what they saw last: embed TICKET PICTURE.ppm
+// Watches a Tessera session with two eyes, and writes what they saw last:
+//   TESSERA_TICKET=tessera://... embed PICTURE.ppm
+// The ticket is a secret; everybody on a machine sees the arguments of its programs.
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <iostream>
 #include <tessera/tessera.hpp>
 #include <thread>
@@ -17,11 +20,12 @@ TesseraPose pose(double right, double angle) {
 }
 
 int main(int argc, char** argv) try {
-  if (argc != 3) throw std::runtime_error("usage: embed TICKET PICTURE.ppm");
+  const char* ticket = std::getenv("TESSERA_TICKET");
+  if (argc != 2 || !ticket) throw std::runtime_error("usage: TESSERA_TICKET=tessera://... embed PICTURE.ppm");
   Offscreen window(2 * kWidth, kHeight);
   auto info = tessera::make<TesseraSessionCreateInfo>();
   info.apiVersion = TESSERA_API_VERSION;
-  info.ticket = argv[1];
+  info.ticket = ticket;
   info.viewWidth = kWidth;
   info.viewHeight = kHeight;
   info.fov = kFov;
@@ -49,7 +53,7 @@ int main(int argc, char** argv) try {
     glFinish();  // an app with a window: eglSwapBuffers()
     if (frame) session.report_displayed(frame->frame, tesseraGetTime());
   }
-  window.write_ppm(argv[2]);
+  window.write_ppm(argv[1]);
   std::cout << kFrames << " frames drawn, " << session.statistics().frames << " received\n";
 } catch (const std::exception& e) {
   std::cerr << "embed: " << e.what() << "\n";

@@ -11,10 +11,10 @@
  * too. Results: 0 done; above 0 done, with something to know; below 0 not done, and nothing has changed.
  * Space: metres, right-handed, +Y up; a head looks along its -Z. Angles are tangents. Colours are sRGB.
  * Time: int64 nanoseconds of CLOCK_MONOTONIC, as std::chrono::steady_clock on Linux and System.nanoTime() on
- * Android. Threads: a function that says "any thread" may be called from several at once. Those of the
- * "drawing thread" may be called from one thread at a time, all of a session's together. Destroying a handle
- * must be the last use of it. Memory: the library keeps no pointer that it is given, and no exception leaves
- * it.
+ * Android, within ±2^60 (36 years), where the wall clock's are not. Text: UTF-8. Threads: a function that
+ * says "any thread" may be called from several at once. Those of the "drawing thread" may be called from one
+ * thread at a time, all of a session's together. Destroying a handle must be the last use of it. Memory: the
+ * library keeps no pointer that it is given, and no exception leaves it.
  */
 #ifndef TESSERA_TESSERA_H_
 #define TESSERA_TESSERA_H_
@@ -61,6 +61,7 @@ typedef enum TesseraResult {
   TESSERA_ERROR_TIMEOUT = -9,
   TESSERA_ERROR_REFUSED = -10,       /* the server does not know the ticket's token */
   TESSERA_ERROR_SESSION_ENDED = -11, /* by the server; the text has its reason */
+  TESSERA_ERROR_BUSY = -12,          /* another app watches the session: try again once it has left */
 
   TESSERA_RESULT_MAX_ENUM = 0x7fffffff
 } TesseraResult;
@@ -102,7 +103,7 @@ typedef struct TesseraSessionCreateInfo { /* TESSERA_TYPE_SESSION_CREATE_INFO */
   uint32_t viewHeight;
   TesseraFov fov;         /* of the head: what either eye sees */
   float displayRate;      /* Hz, 1..1000 */
-  int64_t connectTimeout; /* ns, up to 60 s; 0: 8 s */
+  int64_t connectTimeout; /* ns, up to 60 s, for all addresses of the host together; 0: 8 s */
 } TesseraSessionCreateInfo;
 
 typedef struct TesseraPoseInfo { /* TESSERA_TYPE_POSE_INFO */
@@ -207,8 +208,8 @@ TESSERA_API int64_t tesseraGetTime(void);
 
 /* Any thread. Returns at once; events tell how it goes. A ticket serves one session at a time. */
 TESSERA_API TesseraResult tesseraCreateSession(const TesseraSessionCreateInfo* info, TesseraSession* session);
-/* Any thread. Tells the server; may wait for the network, up to connectTimeout for each address of the host
- * while it is still connecting. TESSERA_ERROR_CALL_ORDER: it has renderers. NULL is no error. */
+/* Any thread. Tells the server; may wait for the network, up to connectTimeout (and a second) while it is
+ * still connecting. TESSERA_ERROR_CALL_ORDER: it has renderers. NULL is no error. */
 TESSERA_API TesseraResult tesseraDestroySession(TesseraSession session);
 
 /* Any thread. The next event, in this order: connecting, streaming, first picture, frames, lost. */
