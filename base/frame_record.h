@@ -46,8 +46,8 @@ struct FrameRecord {
   bool key_frame = false;
   uint64_t atlas_bytes = 0, meta_bytes = 0;
   TimeNs scene_time = 0;  // that it shows
-  // Of the pose that it was made for, on the client's clock: for when it is (it may be a prediction), and when
-  // it was sent.
+  // Of the pose that it was made for, on the client's clock: for when it is (it may be a prediction), and
+  // when it was sent.
   TimeNs pose_time = 0, pose_sent = 0;
   ServerFrameTimes server;
   ClientFrameTimes client;

@@ -145,8 +145,7 @@ std::string latency_table(const json& run) {
   if (run.at("settings").value("clock", "") != "real") return "";
   std::vector<std::string> names;
   for (const auto& [name, duration] : FrameDurations().named()) names.emplace_back(name);
-  std::string html =
-      "<h3>Latency: p50 / p99 in ms</h3>\n<div class=\"scroll\"><table><tr><th>session</th>";
+  std::string html = "<h3>Latency: p50 / p99 in ms</h3>\n<div class=\"scroll\"><table><tr><th>session</th>";
   for (const std::string& name : names) absl::StrAppend(&html, "<th>", name, "</th>");
   html += "<th>end to end</th><th>overhead</th><th>largest tiling error</th></tr>\n";
   const auto cell = [](const json& of, const std::string& name) {
@@ -162,7 +161,8 @@ std::string latency_table(const json& run) {
   }
   return html +
          "</table></div>\n<p class=\"soft\">Of the two decodings the one that ends last counts in the total. "
-         "Overhead is what is neither rendering, coding, drawing, the network, nor waiting for the next frame's "
+         "Overhead is what is neither rendering, coding, drawing, the network, nor waiting for the next "
+         "frame's "
          "time.</p>\n";
 }
 
@@ -249,11 +249,12 @@ std::string settings_text(const json& settings) {
 
 std::string title_of(const json& run) {
   const json& s = run.at("settings");
-  return absl::StrCat(std::filesystem::path(s.at("scene").get<std::string>()).stem().string(), ", ",
-                      s.at("size").get<std::string>(), ", atlas ", s.at("atlas").get<std::string>(), ", ",
-                      number(s, "bitrate-mbps", 1), " Mbit/s, ",
-                      s.value("clock", "") == "real" ? "real clock" : number(s, "delay-ms", 0) + " ms each way",
-                      ", codec ", s.at("codec").get<std::string>());
+  return absl::StrCat(
+      std::filesystem::path(s.at("scene").get<std::string>()).stem().string(), ", ",
+      s.at("size").get<std::string>(), ", atlas ", s.at("atlas").get<std::string>(), ", ",
+      number(s, "bitrate-mbps", 1), " Mbit/s, ",
+      s.value("clock", "") == "real" ? "real clock" : number(s, "delay-ms", 0) + " ms each way", ", codec ",
+      s.at("codec").get<std::string>());
 }
 
 std::string run_html(const std::filesystem::path& folder, const json& run) {

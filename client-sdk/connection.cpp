@@ -25,8 +25,8 @@ using transport::FrameType;
 // The first pings come fast, for an offset of the clocks before the first picture.
 constexpr DurationNs kPingIntervalNs = kNsPerSecond, kFirstPingIntervalNs = 50 * kNsPerMs;
 constexpr uint32_t kFirstPings = 8;
-// That wait for the decoder. Video beyond it is dropped up to the next key frame, so that a slow decoder lowers
-// the rate and not the age of what is shown; metas, which cannot be missed, end the connection.
+// That wait for the decoder. Video beyond it is dropped up to the next key frame, so that a slow decoder
+// lowers the rate and not the age of what is shown; metas, which cannot be missed, end the connection.
 constexpr size_t kMaxUndecodedAtlases = 4;
 constexpr size_t kMaxUndecodedMetaBytes = 32u << 20;
 // However long the steps before took, a few hellos are tried.
@@ -70,7 +70,7 @@ struct Connection::Impl {
   uint32_t ping_id = 0;  // the receiving thread's, as is
   bool closing = false;
   std::atomic<size_t> undecoded_atlases{0}, undecoded_meta_bytes{0};
-  FrameTimes times;                        // the decoder's, with the core's receiving side
+  FrameTimes times;  // the decoder's, with the core's receiving side
 
   mutable std::mutex mutex;  // of all below
   transport::ClockOffset offset;
@@ -163,8 +163,8 @@ Status Connection::Impl::on_frame(FrameType type, std::span<const uint8_t> paylo
 
 Status Connection::Impl::on_meta(std::span<const uint8_t> packet) {
   if (undecoded_meta_bytes + packet.size() > kMaxUndecodedMetaBytes) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("this client decodes too slowly: ", kMaxUndecodedMetaBytes >> 20, " MiB of geometry wait"));
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "this client decodes too slowly: ", kMaxUndecodedMetaBytes >> 20, " MiB of geometry wait"));
   }
   undecoded_meta_bytes += packet.size();
   asio::post(decoder, [this, complete = clock.now(), copy = std::vector(packet.begin(), packet.end())] {

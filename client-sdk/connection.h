@@ -45,8 +45,8 @@ class Connection {
   void send_pose(const TimedPose& pose);
   // See ClientCore::take_newest(). Counts as the moment at which drawing begins.
   const Pair* take_newest();
-  // The moment at which a pair's first picture was shown. The server predicts by it. All that is known of this
-  // frame, and of those before it, goes to the server (base/frame_record.h).
+  // The moment at which a pair's first picture was shown. The server predicts by it. All that is known of
+  // this frame, and of those before it, goes to the server (base/frame_record.h).
   void report_displayed(FrameNumber frame, TimeNs displayed_ns);
 
   // OK while the session runs; then why it ended.

@@ -263,6 +263,7 @@ grpc::Status ControlService::ListSessions(grpc::ServerContext*, const v1::ListSe
 }
 
 Status ControlService::update(uint64_t session, const v1::SessionSettings& wanted) {
+  const std::lock_guard one_at_a_time(updating_);
   v1::SessionSettings merged;
   {
     const std::lock_guard lock(mutex_);

@@ -78,6 +78,7 @@ class ControlService final : public v1::Control::Service {
   const v1::ServerInfo info_;
   enum class State { starting, open, draining };
   std::atomic<State> state_ = State::starting;
+  std::mutex updating_;  // taken before mutex_
   mutable std::mutex mutex_;
   std::condition_variable drained_;
   uint32_t watchers_ = 0;

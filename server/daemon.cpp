@@ -68,6 +68,7 @@ StatusOr<StreamServerSettings> stream_settings(const DaemonSettings& s) {
   out.media.address = out.meta.address = s.address;
   out.media.port = s.media_port;
   out.meta.port = s.meta_port;
+  out.idle_timeout_ns = s.idle_timeout * kNsPerSecond;
   out.max_sessions = s.max_sessions;
   out.max_atlas_texels = uint64_t{s.max_atlas_mtexels} << 20;
   out.insecure = s.insecure;

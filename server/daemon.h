@@ -26,6 +26,7 @@ struct DaemonSettings {
   uint32_t max_atlas_mtexels = 128;  // 2^20 texels, of all sessions together
   uint32_t max_scene_mib = 0;        // device memory of all scenes together; 0: what the device has
   uint32_t max_watchers = 64;        // calls that stay open
+  uint32_t idle_timeout = 300;       // seconds that a session is kept without a client; 0: for ever
   std::vector<std::string> scenes;   // NAME=SOURCE, loaded at the start
   std::string scene_root;            // where LoadScene may read files; empty: nowhere
   std::string device = "cpu";

@@ -37,6 +37,9 @@ void add_options(CLI::App& app, DaemonSettings& s, LogSettings& log) {
   add("Sessions", "max-atlas-mtexels", s.max_atlas_mtexels,
       "2^20 texels of all sessions' atlases together; an atlas of 2048x1024 has 2")
       ->check(CLI::Range(1, 65536));
+  add("Sessions", "idle-timeout", s.idle_timeout,
+      "seconds that a session is kept without a client; 0: for ever")
+      ->check(CLI::Range(0, 1'000'000));
   add("Sessions", "max-watchers", s.max_watchers,
       "WatchSession, WatchFrames and ForwardStream calls at a time")
       ->check(CLI::Range(1, 1024));

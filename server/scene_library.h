@@ -18,7 +18,7 @@ struct SceneInfo {
   std::string name, source;
   uint64_t triangles = 0;  // instanced
   uint32_t materials = 0;
-  Aabb bounds;     // at the animation's start
+  Aabb bounds;            // at the animation's start
   double device_mib = 0;  // what loading it added
   std::vector<std::string> notes;
   FramePlan plan;

@@ -91,6 +91,7 @@ struct StreamServer::Impl {
   void run_renderer();
   std::shared_ptr<StreamedSession> next_ready(std::unique_lock<std::mutex>& lock);
   void do_device_work(std::unique_lock<std::mutex>& lock);
+  void end_idle(std::unique_lock<std::mutex>& lock);
   void wake();
   StatusOr<transport::Admission> admit(const transport::Hello& hello, const std::string& peer);
   StatusOr<Entry> find_token(const SessionToken& token) const;
@@ -156,9 +157,29 @@ void StreamServer::Impl::do_device_work(std::unique_lock<std::mutex>& lock) {
   }
 }
 
+// Whoever made them has forgotten them, or died: they must not take places for ever.
+void StreamServer::Impl::end_idle(std::unique_lock<std::mutex>& lock) {
+  if (settings.idle_timeout_ns == 0) return;
+  std::vector<SessionId> idle;
+  for (const auto& [id, entry] : sessions) {
+    const std::optional<TimeNs> since = entry.session->idle_since();
+    if (since && clock.now() - *since > settings.idle_timeout_ns) idle.push_back(id);
+  }
+  if (idle.empty()) return;
+  const Status reason = absl::DeadlineExceededError(
+      absl::StrCat("no client for ", to_seconds(settings.idle_timeout_ns), " s (--idle-timeout)"));
+  lock.unlock();
+  for (const SessionId id : idle) {
+    log_event(spdlog::level::info, "session ended", {{"session", id}, {"reason", reason.message()}});
+    (void)end(id, reason);
+  }
+  lock.lock();
+}
+
 // Earliest deadline first: under overload all sessions fall behind evenly. Null when the server stops.
 std::shared_ptr<StreamedSession> StreamServer::Impl::next_ready(std::unique_lock<std::mutex>& lock) {
   while (!stopping) {
+    end_idle(lock);
     do_device_work(lock);
     std::shared_ptr<StreamedSession> earliest;
     for (const auto& [id, entry] : sessions) {

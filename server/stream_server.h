@@ -21,6 +21,7 @@ struct StreamServerSettings {
   transport::MetaListenerSettings meta;  // likewise
   size_t max_sessions = 32;
   uint64_t max_atlas_texels = 128u << 20;  // of all sessions together
+  DurationNs idle_timeout_ns = 0;          // a session without a client ends after it; 0: never
   StreamedSession::OnRendered on_rendered;
   bool insecure = false;  // allows other addresses than loopback without TLS
 };

@@ -10,7 +10,7 @@ namespace {
 
 using transport::FrameType;
 
-constexpr DurationNs kHistoryNs = kNsPerSecond / 2;       // of poses, for prediction
+constexpr DurationNs kHistoryNs = kNsPerSecond / 2;  // of poses, for prediction
 constexpr size_t kMaxPoses = 256;
 // Of a client's view: id buffers of this size are drawn and read back for every predicted one.
 constexpr uint32_t kMaxViewPixels = 1u << 24;
@@ -38,6 +38,7 @@ StreamedSession::StreamedSession(transport::SessionId id, RendererFactory make_r
       make_renderer_(std::move(make_renderer)),
       rate_(settings.rate) {
   stats_.round_trip_ns = kFirstRoundTripNs;
+  idle_since_ns_ = clock_.now();
 }
 
 Status StreamedSession::admit(const transport::ClientSettings& client) {
@@ -81,6 +82,7 @@ void StreamedSession::on_closed(const Status& reason) {
   admitted_ = bound_ = false;
   restart_ = true;  // the next client knows nothing
   prepared_ = false;
+  idle_since_ns_ = clock_.now();
   stats_.ended = reason;
 }
 
@@ -178,6 +180,11 @@ void StreamedSession::close(const Status& reason) {
 bool StreamedSession::ready() const {
   const std::lock_guard lock(mutex_);
   return connection_ && (!prepared_ || (bound_ && !poses_.empty()));
+}
+
+std::optional<TimeNs> StreamedSession::idle_since() const {
+  const std::lock_guard lock(mutex_);
+  return admitted_ ? std::nullopt : std::optional(idle_since_ns_);
 }
 
 TimeNs StreamedSession::due_ns() const {

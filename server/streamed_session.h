@@ -59,6 +59,8 @@ class StreamedSession {
   // There is something to do: a renderer to make for a client that has come, or a frame, as both connections
   // stand and a pose is there.
   bool ready() const;
+  // Since when it has had no client, if it has none.
+  std::optional<TimeNs> idle_since() const;
   // When its next frame should start, on the server's clock.
   TimeNs due_ns() const;
   // From the next frame on.
@@ -117,7 +119,7 @@ class StreamedSession {
   uint64_t first_record_ = 0;  // number of records_.front()
   bool admitted_ = false, bound_ = false, key_frame_wanted_ = false, restart_ = false, prepared_ = false;
   std::optional<Status> closed_;  // why
-  TimeNs due_ns_ = 0;
+  TimeNs due_ns_ = 0, idle_since_ns_ = 0;
   RateSplit rate_;
   std::deque<std::pair<TimeNs, uint64_t>> sent_;  // when, bytes; of the last second
   StreamedSessionStats stats_;

@@ -67,8 +67,8 @@ transport::ClientSettings client_settings(const Settings& s) {
           .name = "tessera-client"};
 }
 
-// Follows the path; or stands at --position and looks around; or walks around the whole scene, looking in. Once
-// around takes ten seconds.
+// Follows the path; or stands at --position and looks around; or walks around the whole scene, looking in.
+// Once around takes ten seconds.
 class Head {
  public:
   // `session` knows the scene; null: it cannot be asked.
@@ -85,7 +85,8 @@ class Head {
       head.center_ = (low + high) / 2.0;
       // The ball around the scene fits into the narrower field of view.
       const Fov fov = view_of(s).fov;
-      head.distance_ = 0.5 * glm::length(high - low) / std::sin(0.5 * std::min(fov.width_rad(), fov.height_rad()));
+      head.distance_ =
+          0.5 * glm::length(high - low) / std::sin(0.5 * std::min(fov.width_rad(), fov.height_rad()));
     }
     return head;
   }
@@ -281,8 +282,10 @@ int main(int argc, char** argv) {
                "print the new session's ticket, a secret, and leave it to an app")
       ->needs(scene);
   CLI::Option* path = app.add_option("--path", s.path, "camera path (CSV): t_seconds,px,py,pz,qx,qy,qz,qw")
-      ->check(CLI::ExistingFile);
-  app.add_option("--position", s.position, "stand here (x y z in metres) and look around; neither this nor --path: walk around the scene")
+                          ->check(CLI::ExistingFile);
+  app.add_option(
+         "--position", s.position,
+         "stand here (x y z in metres) and look around; neither this nor --path: walk around the scene")
       ->expected(3)
       ->excludes(path);
   app.add_option("--seconds", s.seconds, "how long, from the first picture on")

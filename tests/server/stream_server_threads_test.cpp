@@ -74,6 +74,23 @@ TEST_F(StreamServerThreadsTest, EveryClientHasAStreamOfItsOwn) {
   }
 }
 
+// A place that nobody takes is free again; one whose client stays is kept.
+TEST_F(StreamServerThreadsTest, ASessionWithoutAClientEnds) {
+  start({.idle_timeout_ns = 300 * kNsPerMs});
+  const SessionTicket forgotten = ticket(), used = ticket();
+  auto client = connect(used);
+  ASSERT_TRUE(client.ok()) << client.status();
+  EXPECT_TRUE(display_until(**client, [&](const client::Pair*) {
+    return absl::IsNotFound(server_->stats(forgotten.session).status());
+  }));
+  EXPECT_EQ(server_->sessions(), 1u);
+  EXPECT_TRUE((*client)->status().ok()) << (*client)->status();
+  client->reset();
+  const TimeNs give_up = clock_.now() + test::kPatienceNs;
+  while (server_->sessions() > 0 && clock_.now() < give_up) std::this_thread::yield();
+  EXPECT_EQ(server_->sessions(), 0u);
+}
+
 // Whoever of the two is first, the client hears of it, and the server forgets it.
 TEST_F(StreamServerThreadsTest, SessionsEndWhileTheirClientsConnect) {
   start();
