@@ -201,7 +201,8 @@ void StreamServer::Impl::run_renderer() {
     if (const Status status = session->render(); !status.ok()) {
       log_event(spdlog::level::err, "session failed",
                 {{"session", session->id()}, {"reason", status.ToString()}});
-      (void)end(session->id(), status);
+      // Whatever its code, to the client it is a failure of the server's.
+      (void)end(session->id(), absl::InternalError(absl::StrCat("rendering failed: ", status.message())));
     }
     lock.lock();
   }
