@@ -70,6 +70,7 @@ Status write_outputs(const bench::LoopbackResult& result) {
 
 void print_latency(const bench::LoopbackResult& result) {
   for (const bench::Row& row : result.rows) {
+    if (!row.overhead_ms) continue;  // it showed nothing
     const double fps = row.server_fps.value_or(0);
     std::cout << absl::StrFormat("session %d: %.1f server frames/s; ms, p50 / p99:", row.session, fps);
     for (const auto& [name, p] : row.durations_ms)
@@ -77,6 +78,8 @@ void print_latency(const bench::LoopbackResult& result) {
     std::cout << absl::StrFormat(" end to end %.1f / %.1f; overhead %.2f / %.2f; tiling error at most %.3f\n",
                                  row.end_to_end_ms->p50, row.end_to_end_ms->p99, row.overhead_ms->p50,
                                  row.overhead_ms->p99, *row.tiling_error_ms_max);
+    std::cout << absl::StrFormat("session %d: first picture after %.1f\n", row.session,
+                                 row.first_picture_ms.value_or(0));
   }
 }
 

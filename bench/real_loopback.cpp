@@ -294,7 +294,14 @@ void RealLoopback::fill_row(const Viewer& viewer, uint32_t session) {
   row.client_ms = draw_ms / static_cast<double>(std::max<uint64_t>(shown, 1));
   row.peak_rss_mib = daemon_rss_mib_;
   row.device_mib = scene_device_mib_;
-  add_durations(records, row);
+  // Measuring begins with the first picture, as scoring does; the frame that brings it has a session to set
+  // up.
+  const auto first =
+      std::ranges::find_if(records, [](const FrameRecord& r) { return durations(r).has_value(); });
+  if (first != records.end()) {
+    row.first_picture_ms = to_ms(durations(*first)->end_to_end);
+    add_durations({first + 1, records.end()}, row);
+  }
   result_.rows.push_back(std::move(row));
 }
 

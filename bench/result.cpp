@@ -52,6 +52,7 @@ json to_json(const Row& row) {
   if (row.mssim_masked) j["mssim_masked"] = *row.mssim_masked;
   if (row.tiling_error_ms_max) j["tiling_error_ms_max"] = *row.tiling_error_ms_max;
   if (row.server_fps) j["server_fps"] = *row.server_fps;
+  if (row.first_picture_ms) j["first_picture_ms"] = *row.first_picture_ms;
   if (row.overhead_ms) j["overhead_ms"] = to_json(*row.overhead_ms);
   if (row.end_to_end_ms) j["end_to_end_ms"] = to_json(*row.end_to_end_ms);
   for (const auto& [name, p] : row.durations_ms) j["durations_ms"][name] = to_json(p);

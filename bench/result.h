@@ -43,8 +43,10 @@ struct Row {
   std::optional<Percentiles> end_to_end_ms;
   std::optional<double> tiling_error_ms_max;
   std::optional<Percentiles> overhead_ms;  // FrameDurations::overhead
-  std::optional<double> server_fps;        // by the real clock
-  double server_ms = 0, client_ms = 0;     // mean compute time of a frame on this machine
+  std::optional<double>
+      first_picture_ms;                 // end to end, of the frame that begins the session; not in the above
+  std::optional<double> server_fps;     // by the real clock
+  double server_ms = 0, client_ms = 0;  // mean compute time of a frame on this machine
   uint64_t samples_shaded = 0;
   double peak_rss_mib = 0, device_mib = 0;
 };

@@ -1,5 +1,11 @@
 #include "gpu/device.h"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <optional>
+#include <thread>
+
 #include "gpu/impl.h"
 
 namespace tessera::gpu {
@@ -33,6 +39,20 @@ void record_setup(Core& core, const vk::raii::CommandBuffer& cmd) {
   for (const vk::Buffer buffer : core.new_buffers) cmd.fillBuffer(buffer, 0, VK_WHOLE_SIZE, 0);
   if (!core.new_buffers.empty()) full_barrier(cmd);
   cmd.end();
+}
+
+// A software device starts its workers here, one for each core; they inherit this thread's priority, so that
+// whoever feeds the device and the network goes before them.
+template <class F>
+auto on_background_thread(F&& work) {
+  constexpr int kNice = 5;
+  std::optional<decltype(work())> result;
+  std::thread([&] {
+    // A refusal changes nothing but waiting times. Linux: of this thread alone.
+    (void)setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
+    result.emplace(work());
+  }).join();
+  return *std::move(result);
 }
 
 }  // namespace
@@ -139,7 +159,8 @@ void full_barrier(const vk::raii::CommandBuffer& cmd) {
 }
 
 StatusOr<std::shared_ptr<Device>> Device::create(const DeviceOptions& options) {
-  TESSERA_ASSIGN_OR_RETURN(std::shared_ptr<Core> core, Core::create(options));
+  TESSERA_ASSIGN_OR_RETURN(std::shared_ptr<Core> core,
+                           on_background_thread([&] { return Core::create(options); }));
   return guarded([&]() -> StatusOr<std::shared_ptr<Device>> {
     return std::shared_ptr<Device>(new Device(std::make_unique<DeviceImpl>(std::move(core))));
   });

@@ -268,7 +268,6 @@ Status StreamedSession::render() {
                                                                  .scene_time_ns = record.scene_time,
                                                                  .key_frame = work.key_frame}));
   record.server.render_end = clock_.now();
-  put_off();
   count(frame);
   log_event(spdlog::level::debug, "frame rendered",
             {{"session", id_},
@@ -278,7 +277,9 @@ Status StreamedSession::render() {
              {"meta_bytes", frame.meta.size()},
              {"render_ms", frame.stats.times.total_ms()}});
   if (on_rendered_) on_rendered_(frame.stats);
-  return send(work, frame, record);
+  const Status sent = send(work, frame, record);
+  put_off();
+  return sent;
 }
 
 Status StreamedSession::prepare(const Work& work) {
