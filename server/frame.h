@@ -34,6 +34,7 @@ struct FrameInput {
   FrameNumber number = 0;
   std::span<const TimedPose> poses;  // received so far, by time, newest last; at least one
   DurationNs round_trip_ns = 0;      // from a pose to the picture that shows its frame
+  DurationNs interval_ns = 0;        // between frames, where it is longer than the rate says
   TimeNs scene_time_ns = 0;          // animation
   bool key_frame = false;
 };

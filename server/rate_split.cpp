@@ -9,6 +9,14 @@ double RateSplit::atlas_bits(double meta_bits, bool key_frame) const {
   return std::max(allowance - meta_bits, atlas_floor * allowance);
 }
 
+RateSplit RateSplit::at_interval(DurationNs interval_ns) const {
+  const double frames = std::clamp(0.5 * to_seconds(interval_ns) * frames_per_second, 1.0, key_frame_budgets);
+  RateSplit slower = *this;
+  slower.frames_per_second /= frames;
+  slower.key_frame_budgets /= frames;
+  return slower;
+}
+
 bool RateSplit::may_render(DurationNs backlog_ns) const {
   return to_seconds(backlog_ns) * frames_per_second <= 1.0;
 }

@@ -12,6 +12,9 @@ struct RateSplit {
   double key_frame_budgets = 4;  // a key frame may take this many frames' bits
 
   double frame_bits() const { return bitrate_bps / frames_per_second; }
+  // For frames that come further apart than planned: a frame may then take half of its time, as long as a key
+  // frame may take at most. Key frames stay as they are.
+  RateSplit at_interval(DurationNs interval_ns) const;
   // Bits for the atlas beside `meta_bits` of geometry.
   double atlas_bits(double meta_bits, bool key_frame) const;
   // False while the network still holds more than one frame's worth of bytes: then the frame is skipped

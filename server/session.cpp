@@ -89,7 +89,8 @@ Status Session::Impl::set_up() {
 Status Session::Impl::find_visible(const FrameInput& input, FrameStats& stats) {
   const TimedPose& newest = input.poses.back();
   pvs::PredictionSettings prediction = settings.prediction;
-  horizon_ns = input.round_trip_ns + from_seconds(1.0 / settings.rate.frames_per_second);
+  horizon_ns =
+      input.round_trip_ns + std::max(input.interval_ns, from_seconds(1.0 / settings.rate.frames_per_second));
   prediction.horizon_ns = horizon_ns;
   prediction.step_ns = std::max(prediction.step_ns, horizon_ns / (kMaxPredictedViews - 1) + 1);
   views = pvs::predict_views(input.poses, newest.time_ns, settings.client_view, prediction);
@@ -129,7 +130,8 @@ Status Session::Impl::encode(const FrameInput& input, const atlas::LayoutDelta& 
   frame.meta = geometry_compression::encode(values, &frame.stats.meta_bits);
 
   const bool key_frame = std::exchange(first, false) || input.key_frame;
-  const double budget = settings.rate.atlas_bits(8.0 * static_cast<double>(frame.meta.size()), key_frame);
+  const double budget = settings.rate.at_interval(input.interval_ns)
+                            .atlas_bits(8.0 * static_cast<double>(frame.meta.size()), key_frame);
   TESSERA_ASSIGN_OR_RETURN(frame.atlas,
                            encoder->encode(frame.number, converter->result(), budget, key_frame));
   return absl::OkStatus();

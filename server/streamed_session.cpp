@@ -262,11 +262,13 @@ Status StreamedSession::render() {
   FrameRecord record{.session = id_, .frame = next_frame_++, .pose_sent = work.pose_sent_ns};
   record.server = {.pose_received = work.pose_received_ns, .due = work.due_ns, .render_begin = clock_.now()};
   record.scene_time = record.server.render_begin;
-  TESSERA_ASSIGN_OR_RETURN(const Frame frame, renderer_->render({.number = record.frame,
-                                                                 .poses = work.poses,
-                                                                 .round_trip_ns = work.round_trip_ns,
-                                                                 .scene_time_ns = record.scene_time,
-                                                                 .key_frame = work.key_frame}));
+  TESSERA_ASSIGN_OR_RETURN(const Frame frame,
+                           renderer_->render({.number = record.frame,
+                                              .poses = work.poses,
+                                              .round_trip_ns = work.round_trip_ns,
+                                              .interval_ns = interval_ns(record.server.render_begin),
+                                              .scene_time_ns = record.scene_time,
+                                              .key_frame = work.key_frame}));
   record.server.render_end = clock_.now();
   count(frame);
   log_event(spdlog::level::debug, "frame rendered",
@@ -280,6 +282,12 @@ Status StreamedSession::render() {
   const Status sent = send(work, frame, record);
   put_off();
   return sent;
+}
+
+// How long the frame before had to last: this one will have to as well.
+DurationNs StreamedSession::interval_ns(TimeNs begin) {
+  const TimeNs before = std::exchange(last_begin_ns_, begin);
+  return before == 0 ? 0 : std::min(begin - before, kMaxRoundTripNs);
 }
 
 Status StreamedSession::prepare(const Work& work) {

@@ -92,6 +92,7 @@ class StreamedSession {
   Status on_timing(std::span<const uint8_t> payload);
   Status answer_ping(std::span<const uint8_t> payload);
   Work take_work();
+  DurationNs interval_ns(TimeNs begin);
   Status prepare(const Work& work);
   Status send(const Work& work, const Frame& frame, FrameRecord record);
   void put_off();
@@ -108,6 +109,7 @@ class StreamedSession {
   RendererFactory make_renderer_;            // the render thread's, with all of the device
   std::unique_ptr<FrameRenderer> renderer_;  // likewise
   FrameNumber next_frame_ = 1;               // likewise
+  TimeNs last_begin_ns_ = 0;                 // likewise
 
   mutable std::mutex mutex_;  // of all below
   std::shared_ptr<transport::MetaConnection> connection_;

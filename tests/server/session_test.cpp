@@ -146,6 +146,20 @@ TEST_F(SessionTest, MoreLatencyMeansWiderSpacedViewsUpToTheHorizon) {
   EXPECT_GT(before, 4u);
 }
 
+// The visible set must last until the next frame, whenever that comes.
+TEST_F(SessionTest, ALongerIntervalReachesFurther) {
+  auto quad = make_quad();
+  quad->index_instances();
+  auto session = must(Session::create(must(SharedScene::create(device(), quad)), small_settings()));
+  const std::vector<TimedPose> poses = {{0, Pose{}}, {from_ms(33), Pose{.position = {0.1, 0, 0}}}};
+  must(session->render(input(0, poses)));
+  EXPECT_EQ(session->horizon_ns(), from_ms(100) + from_seconds(1.0 / 30));
+  FrameInput late = input(1, poses);
+  late.interval_ns = from_ms(500);
+  must(session->render(late));
+  EXPECT_EQ(session->horizon_ns(), from_ms(600));
+}
+
 TEST_F(SessionTest, RefusesAFrameWithoutPoses) {
   auto quad = make_quad();
   quad->index_instances();
