@@ -48,7 +48,7 @@ class EmbedTest : public DaemonFixture {
 TEST_F(EmbedTest, TheExampleBuiltByFindPackageShowsASession) {
   start({});
   const std::string build = (folder_ / "build").string();
-  ASSERT_EQ(run("cmake -S " TESSERA_SOURCE "/client-sdk/examples/embed -B " + build +
+  ASSERT_EQ(run("cmake -G Ninja -S " TESSERA_SOURCE "/client-sdk/examples/embed -B " + build +
                 " -DCMAKE_PREFIX_PATH=" + prefix() + " && cmake --build " + build),
             0)
       << output_;

@@ -101,22 +101,22 @@ TEST_F(Program, SpeaksTlsToControlAndSession) {
   const transport::test::Certificate certificate("localhost");
   start({.tls_certificate = certificate.certificate_file(), .tls_key = certificate.key_file()});
   const std::string authority = " --ca " + certificate.certificate_file();
-  ASSERT_EQ(run(viewer("--scene hall --out " + file("pictures") + authority, "localhost")), 0) << errors_;
+  ASSERT_EQ(run(viewer("--scene hall --out " + file("pictures") + authority)), 0) << errors_;
   EXPECT_TRUE(std::filesystem::exists(file("pictures/000000.png")));
 
-  ASSERT_EQ(run(viewer("--scene hall --print-ticket" + authority, "localhost")), 0) << errors_;
+  ASSERT_EQ(run(viewer("--scene hall --print-ticket" + authority)), 0) << errors_;
   const std::string ticket = output_.substr(0, output_.find('\n'));
   EXPECT_THAT(ticket, HasSubstr("?ca=" + certificate.certificate_file()));
   EXPECT_EQ(run(viewer("--ticket '" + ticket + "'")), 0) << errors_;
   EXPECT_EQ(run(viewer("--ticket " + ticket.substr(0, ticket.find('?')))), 1) << "in clear text";
 
   const transport::test::Certificate other("localhost");
-  EXPECT_EQ(run(viewer("--scene hall --ca " + other.certificate_file(), "localhost")), 1);
+  EXPECT_EQ(run(viewer("--scene hall --ca " + other.certificate_file())), 1);
   EXPECT_EQ(run(viewer("--ticket '" + ticket.substr(0, ticket.find('?')) + "?ca=" + other.certificate_file() +
                        "'")),
             1);
   EXPECT_THAT(errors_, HasSubstr("TLS handshake"));
-  EXPECT_EQ(run(viewer("--scene hall --ca /no/such.pem", "localhost")), 1);
+  EXPECT_EQ(run(viewer("--scene hall --ca /no/such.pem")), 1);
   EXPECT_THAT(errors_, HasSubstr("/no/such.pem"));
 }
 
@@ -132,14 +132,14 @@ TEST_F(Program, ShowsTheControlTokenFromItsFile) {
   start({.tls_certificate = certificate.certificate_file(),
          .tls_key = certificate.key_file(),
          .control_token_file = right});
-  const std::string command = viewer("--scene hall --ca " + certificate.certificate_file(), "localhost");
+  const std::string command = viewer("--scene hall --ca " + certificate.certificate_file());
   const std::string frames = " --frames-csv " + file("frames.csv");  // by a call of its own
   ASSERT_EQ(run(command + frames + " --control-token-file " + right), 0) << errors_;
   EXPECT_GT(std::ranges::count(text_of(file("frames.csv")), '\n'), 1);
   ASSERT_EQ(run("TESSERA_CONTROL_TOKEN_FILE=" + right + " " + command), 0) << errors_;
 
   EXPECT_EQ(run(command), 1);
-  EXPECT_THAT(errors_, AllOf(HasSubstr("control at localhost:"), HasSubstr("no control token"),
+  EXPECT_THAT(errors_, AllOf(HasSubstr("control at 127.0.0.1:"), HasSubstr("no control token"),
                              HasSubstr("--control-token-file")));
   EXPECT_EQ(run(command + " --control-token-file " + wrong), 1);
   EXPECT_THAT(errors_, HasSubstr("wrong control token"));

@@ -197,17 +197,17 @@ TEST_F(Operation, RatesChangeWhileTheClientStays) {
 
   const double before = mean_frame_bytes(**client);
   v1::SessionSettings wanted;
-  wanted.set_bitrate_mbps(3);
+  wanted.set_bitrate_mbps(0.1);
   wanted.set_frames_per_second(120);
   v1::Session session;
   ASSERT_TRUE(update(ticket.session(), wanted, &session).ok());
-  EXPECT_EQ(session.settings().bitrate_mbps(), 3);
+  EXPECT_EQ(session.settings().bitrate_mbps(), 0.1);
   EXPECT_EQ(session.settings().frames_per_second(), 120);
   EXPECT_EQ(session.settings().atlas_width(), 512u) << "what is not named stays";
   const double after = mean_frame_bytes(**client);
-  EXPECT_LT(after, before / 2) << "an eighth of the rate, four times the frames";
+  EXPECT_LT(after, before / 2) << "a two-hundredth of the rate, four times the frames";
   EXPECT_TRUE((*client)->status().ok()) << (*client)->status();
-  EXPECT_EQ(get(ticket.session()).settings().bitrate_mbps(), 3) << "and stays";
+  EXPECT_EQ(get(ticket.session()).settings().bitrate_mbps(), 0.1) << "and stays";
 }
 
 TEST_F(Operation, AnUpdateThatCannotBeIsRefusedWhole) {

@@ -1,4 +1,5 @@
-// A self-signed certificate for tests, in files that go away with it.
+// A self-signed certificate for tests, of a name and of 127.0.0.1 (a bare machine may not even resolve
+// localhost), in files that go away with it.
 #pragma once
 
 #include <openssl/evp.h>
@@ -30,8 +31,8 @@ class Certificate {
     X509_NAME_add_entry_by_txt(subject, "CN", MBSTRING_ASC,
                                reinterpret_cast<const unsigned char*>(name.c_str()), -1, -1, 0);
     X509_set_issuer_name(x509.get(), subject);
-    X509_EXTENSION* alternative =
-        X509V3_EXT_conf_nid(nullptr, nullptr, NID_subject_alt_name, ("DNS:" + name).c_str());
+    X509_EXTENSION* alternative = X509V3_EXT_conf_nid(nullptr, nullptr, NID_subject_alt_name,
+                                                      ("DNS:" + name + ",IP:127.0.0.1").c_str());
     X509_add_ext(x509.get(), alternative, -1);
     X509_EXTENSION_free(alternative);
     X509_sign(x509.get(), key.get(), EVP_sha256());
