@@ -1,5 +1,6 @@
 #include "client-sdk/tools/controlled_session.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/strip.h>
 #include <grpcpp/grpcpp.h>
 
@@ -7,6 +8,7 @@
 #include <chrono>
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 #include "proto/control_access.h"
 #include "transport/asio/endpoint.h"
@@ -22,6 +24,26 @@ void limit(grpc::ClientContext& context) {
 
 Status to_status(const grpc::Status& status) {
   return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+}
+
+// A daemon that was started a moment ago does not listen before its scenes are loaded.
+Status create_session(v1::Control::Stub& control, const std::string& scene, v1::Ticket& ticket) {
+  constexpr std::chrono::milliseconds kRetryInterval{250};
+  const auto give_up = std::chrono::steady_clock::now() + kCallTimeout;
+  v1::CreateSessionRequest request;
+  request.set_scene(scene);
+  while (true) {
+    grpc::ClientContext context;
+    limit(context);
+    const Status status = to_status(control.CreateSession(&context, request, &ticket));
+    const bool nobody_listens =
+        absl::IsUnavailable(status) && absl::StrContains(status.message(), "Connection refused");
+    if (!nobody_listens) return status;
+    if (std::chrono::steady_clock::now() > give_up)
+      return absl::UnavailableError(
+          absl::StrCat(status.message(), "; does tesserad run, and load its scenes still?"));
+    std::this_thread::sleep_for(kRetryInterval);
+  }
 }
 
 StatusOr<std::shared_ptr<grpc::ChannelCredentials>> credentials(const ControlSettings& settings) {
@@ -69,12 +91,8 @@ StatusOr<std::unique_ptr<ControlledSession>> ControlledSession::create(const Con
   TESSERA_ASSIGN_OR_RETURN(const std::string control_token, token(settings));
   session->stub_ =
       v1::Control::NewStub(control_channel(settings.endpoint, channel_credentials, control_token));
-  grpc::ClientContext context;
-  limit(context);
-  v1::CreateSessionRequest request;
-  request.set_scene(scene);
   v1::Ticket made;
-  if (const Status status = to_status(session->stub_->CreateSession(&context, request, &made)); !status.ok())
+  if (const Status status = create_session(*session->stub_, scene, made); !status.ok())
     return absl::Status(status.code(),
                         absl::StrCat("control at ", settings.endpoint, ": ", status.message()));
   session->id_ = made.session();
