@@ -266,9 +266,11 @@ TEST_F(MetaSockets, APeerThatTakesLittleCannotHoldTheClose) {
   Bytes buffer(64 << 10);
   asio::steady_timer pause(io);
   size_t taken = 0;
-  std::function<void()> sip = [&] {
+  const auto over = std::make_shared<bool>(false);  // outlives the test's body, as a handler under way does
+  std::function<void()> sip = [&, over] {
     pause.expires_after(std::chrono::milliseconds(20));
-    pause.async_wait([&](SystemError) {
+    pause.async_wait([&, over](SystemError cancelled) {
+      if (cancelled || *over) return;
       SystemError error;
       taken += client.read_some(asio::buffer(buffer), error);
       if (!error || error == asio::error::would_block) sip();
@@ -276,7 +278,9 @@ TEST_F(MetaSockets, APeerThatTakesLittleCannotHoldTheClose) {
   };
   client.non_blocking(true);
   sip();
-  ASSERT_TRUE(run_until([&] { return server_closed.has_value(); }));
+  const bool closed = run_until([&] { return server_closed.has_value(); });
+  *over = true;
+  ASSERT_TRUE(closed);
   EXPECT_LT(taken, 10'000'000u);
   EXPECT_EQ(server->queued_bytes(), 0u);
 }
