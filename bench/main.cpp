@@ -88,8 +88,9 @@ void print_summary(const bench::LoopbackResult& result) {
                                "violations");
   for (const bench::Row& row : result.rows) {
     const std::string holes = row.holes ? absl::StrFormat("%.4f%%", 100 * *row.holes) : "-";
-    std::cout << absl::StrFormat("%-14s %8.4f %8.2f %8s %9.2f %9d\n", row.method, row.error.mssim,
-                                 row.error.psnr, holes, row.mbps_total, row.violations);
+    std::cout << absl::StrFormat("%-14s %8.4f %8.2f %8s %9.2f %9s\n", row.method, row.error.mssim,
+                                 row.error.psnr, holes, row.mbps_total,
+                                 row.violations ? absl::StrCat(*row.violations) : "-");
   }
   for (const bench::SplitRow& row : result.split) {
     std::cout << absl::StrFormat("without %-12s %.4f  (it adds %.4f)\n", row.cause, row.mssim, row.added);

@@ -17,9 +17,11 @@
 #include "bench/streamer.h"
 #include "bench/temporary_folder.h"
 #include "bench/truth_source.h"
-#include "client-sdk/ticket.h"
+#include "client-sdk/tools/made_ticket.h"
+#include "proto/control_access.h"
 #include "proto/frame_reader.h"
 #include "scene/procedural.h"
+#include "server/frame_plan.h"
 
 namespace tessera::bench {
 namespace {
@@ -29,12 +31,6 @@ using nlohmann::json;
 constexpr std::chrono::milliseconds kPoll{20};
 constexpr uint32_t kSpareWatchers = 4;  // beside one of each session's frames
 constexpr size_t kLogTail = 2000;       // characters of a failed program's output that are shown
-
-Status to_status(const grpc::Status& status, const char* call) {
-  if (status.ok()) return absl::OkStatus();
-  return {static_cast<absl::StatusCode>(status.error_code()),
-          absl::StrCat(call, ": ", status.error_message())};
-}
 
 Status failed(const char* what, const Program& program, int code) {
   const std::string output = program.output();
@@ -68,14 +64,6 @@ Status write_path(const CameraPath& path, DurationNs start, const std::filesyste
                      : absl::UnavailableError(absl::StrCat("cannot write ", file.string()));
 }
 
-StatusOr<std::string> ticket_text(const v1::Ticket& made) {
-  client::Ticket ticket{.host = "127.0.0.1", .meta_port = static_cast<uint16_t>(made.meta_port())};
-  if (made.token().size() != ticket.token.size())
-    return absl::InternalError("the ticket's token has a wrong size");
-  std::ranges::copy(made.token(), ticket.token.begin());
-  return client::to_string(ticket);
-}
-
 class RealLoopback {
  public:
   RealLoopback(const LoopbackSettings& settings, Progress& progress) : s_(settings), progress_(progress) {
@@ -100,7 +88,7 @@ class RealLoopback {
   Status score_pictures();
   Status score_picture(const json& saved, TruthSource& truth, const MaskedTriangles& masked,
                        ErrorMean& error);
-  void keep(const FramePictures& pictures, const Comparison& comparison, bool worst);
+  void keep(const char* label, const FramePictures& pictures, const Comparison& comparison);
   void fill_row(const Viewer& viewer, uint32_t session);
   std::filesystem::path file(const std::string& name) const { return folder_.path() / name; }
 
@@ -144,9 +132,10 @@ Status RealLoopback::describe_daemon() {
   result_.notes.push_back("encoder: " + info.encoder());
   v1::ListScenesResponse scenes;
   TESSERA_RETURN_IF_ERROR(to_status(control_->ListScenes(&scenes_context, {}, &scenes), "ListScenes"));
+  server::FramePlan plan;
   for (const v1::Pass& pass : scenes.scenes(0).plan())
-    absl::StrAppend(&result_.plan, pass.included() ? "in   " : "out  ", pass.name(), ": ", pass.reason(),
-                    "\n");
+    plan.passes.push_back({pass.name(), pass.included(), pass.reason()});
+  result_.plan = plan.to_string();
   scene_device_mib_ = scenes.scenes(0).device_mib();
   return absl::OkStatus();
 }
@@ -162,7 +151,7 @@ Status RealLoopback::start_viewer(uint32_t index) {
   request.mutable_settings()->set_frames_per_second(s_.server_fps);
   TESSERA_RETURN_IF_ERROR(
       to_status(control_->CreateSession(&context, request, &viewer.ticket), "CreateSession"));
-  TESSERA_ASSIGN_OR_RETURN(const std::string ticket, ticket_text(viewer.ticket));
+  TESSERA_ASSIGN_OR_RETURN(const client::Ticket ticket, client::ticket_of(viewer.ticket, "127.0.0.1"));
   viewer.frames = std::make_unique<FrameReader>(*control_, viewer.ticket.session());
   std::vector<std::string> arguments{"--path",    file("path.csv"),
                                      "--seconds", absl::StrCat(s_.seconds),
@@ -178,7 +167,7 @@ Status RealLoopback::start_viewer(uint32_t index) {
   TESSERA_ASSIGN_OR_RETURN(viewer.program,
                            Program::start({.file = sibling_program("tessera-client"),
                                            .arguments = arguments,
-                                           .environment = {"TESSERA_TICKET=" + ticket},
+                                           .environment = {"TESSERA_TICKET=" + client::to_string(ticket)},
                                            .log = file(absl::StrCat("client", index, ".log"))}));
   return absl::OkStatus();
 }
@@ -254,16 +243,18 @@ Status RealLoopback::score_picture(const json& saved, TruthSource& truth, const 
   display.mssim["tessera"] = comparison.error.mssim;
   display.psnr["tessera"] = comparison.error.psnr;
   result_.frames.push_back(std::move(display));
-  if (result_.pictures.empty())
-    result_.pictures.push_back({"first", "", pictures.index, comparison.error.mssim, pictures.truth->color,
-                                pictures.shown[0], comparison.ssim});
+  if (result_.pictures.empty()) keep("first", pictures, comparison);
   if (comparison.error.mssim < worst_mssim_) {
     worst_mssim_ = comparison.error.mssim;
-    std::erase_if(result_.pictures, [](const Picture& kept) { return kept.label == "worst"; });
-    result_.pictures.push_back({"worst", "", pictures.index, comparison.error.mssim, pictures.truth->color,
-                                pictures.shown[0], comparison.ssim});
+    keep("worst", pictures, comparison);
   }
   return absl::OkStatus();
+}
+
+void RealLoopback::keep(const char* label, const FramePictures& pictures, const Comparison& comparison) {
+  std::erase_if(result_.pictures, [&](const Picture& kept) { return kept.label == label; });
+  result_.pictures.push_back({label, "", pictures.index, comparison.error.mssim, pictures.truth->color,
+                              pictures.shown[0], comparison.ssim});
 }
 
 void RealLoopback::fill_row(const Viewer& viewer, uint32_t session) {

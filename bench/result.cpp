@@ -38,13 +38,13 @@ json to_json(const Row& row) {
          {"frames_displayed", row.frames_displayed},
          {"frames_stale", row.frames_stale},
          {"frames_lost", row.frames_lost},
-         {"violations", row.violations},
          {"server_ms", row.server_ms},
          {"client_ms", row.client_ms},
-         {"samples_shaded", row.samples_shaded},
          {"peak_rss_mib", row.peak_rss_mib},
          {"device_mib", row.device_mib}};
   if (!row.note.empty()) j["note"] = row.note;
+  if (row.violations) j["violations"] = *row.violations;
+  if (row.samples_shaded) j["samples_shaded"] = *row.samples_shaded;
   if (row.holes) j["holes"] = *row.holes;
   if (row.coverage) j["coverage"] = *row.coverage;
   if (row.coverage_without_prediction) j["coverage_without_prediction"] = *row.coverage_without_prediction;

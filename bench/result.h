@@ -38,7 +38,7 @@ struct Row {
   uint64_t frames_displayed = 0;                    // scored or not
   uint64_t frames_stale = 0;                        // displayed again without a newer pair
   uint64_t frames_lost = 0;                         // sent, never shown
-  uint64_t violations = 0;                          // of the pairing rules
+  std::optional<uint64_t> violations;               // of the pairing rules
   std::map<std::string, Percentiles> durations_ms;  // the eight durations by name
   std::optional<Percentiles> end_to_end_ms;
   std::optional<double> tiling_error_ms_max;
@@ -47,7 +47,7 @@ struct Row {
       first_picture_ms;                 // end to end, of the frame that begins the session; not in the above
   std::optional<double> server_fps;     // by the real clock
   double server_ms = 0, client_ms = 0;  // mean compute time of a frame on this machine
-  uint64_t samples_shaded = 0;
+  std::optional<uint64_t> samples_shaded;
   double peak_rss_mib = 0, device_mib = 0;
 };
 

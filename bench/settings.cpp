@@ -36,7 +36,7 @@ void for_each_option(Settings& s, Visitor&& visit) {
   visit("Network", "clock", s.clock,
         "virtual: one process, no waiting, repeatable; real: daemon and clients as processes over loopback, "
         "where "
-        "--server-ms, the emulated network, --pvs, --split and --baselines do not apply");
+        "--server-ms, the emulated network, --pvs, --split, --baselines and --truth-cache do not apply");
   visit("Network", "sessions", s.sessions, "clients at a time, with the real clock");
   visit("Network", "seed", s.seed, "of jitter and loss");
   visit("Scoring", "score-every", s.score_every, "score every n-th displayed frame");

@@ -2,9 +2,7 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "base/image.h"

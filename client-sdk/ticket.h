@@ -36,7 +36,8 @@ StatusOr<Ticket> parse_ticket(absl::string_view text);
 std::string to_string(const Ticket& ticket);
 
 // Connection::connect() to the first of the host's addresses that answers; blocks. The error names the step
-// (certificate, resolve, or as there). `timeout_ns` is for everything together.
+// (certificate, resolve, or as there). `timeout_ns` is for everything
+// together, but the system's resolver takes the time that it takes.
 StatusOr<std::unique_ptr<Connection>> connect(const Ticket& ticket, const transport::ClientSettings& client,
                                               DurationNs timeout_ns, const Clock& clock);
 // To the first of these, one at least; connect_timeout_ns is for all together, shared out evenly: one that a

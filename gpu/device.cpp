@@ -41,8 +41,9 @@ void record_setup(Core& core, const vk::raii::CommandBuffer& cmd) {
   cmd.end();
 }
 
-// A software device starts its workers here, one for each core; they inherit this thread's priority, so that
-// whoever feeds the device and the network goes before them.
+// Where the device is software, its workers start here, one for each core; they inherit this thread's
+// priority, so that whoever feeds the device and the network goes before them. A driver's own threads are no
+// worse off.
 template <class F>
 auto on_background_thread(F&& work) {
   constexpr int kNice = 5;

@@ -66,6 +66,12 @@ StatusOr<std::string> read_control_token(const std::string& file) {
   return line;
 }
 
+Status to_status(const grpc::Status& status, const std::string& call) {
+  if (status.ok()) return absl::OkStatus();
+  return {static_cast<absl::StatusCode>(status.error_code()),
+          absl::StrCat(call, ": ", status.error_message())};
+}
+
 std::shared_ptr<grpc::Channel> control_channel(const std::string& endpoint,
                                                const std::shared_ptr<grpc::ChannelCredentials>& credentials,
                                                const std::string& token,

@@ -16,6 +16,9 @@ namespace tessera {
 // in it.
 StatusOr<std::string> read_control_token(const std::string& file);
 
+// What a call came back with, as one of ours: the codes have the same numbers.
+Status to_status(const grpc::Status& status, const std::string& call);
+
 // A channel whose every call carries the token; empty: none does. What keeps the token secret on its way is
 // up to `credentials`.
 std::shared_ptr<grpc::Channel> control_channel(const std::string& endpoint,

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <utility>
 
+#include "proto/control_access.h"
 #include "proto/frame_record.h"
 
 namespace tessera {
@@ -32,14 +33,18 @@ Status FrameReader::read(grpc::ClientContext& context, bool once) {
   request.set_once(once);
   const auto reader = control_.WatchFrames(&context, request);
   for (v1::FrameRecord record; reader->Read(&record);) {
+    if (record.index() != next_) {
+      context.TryCancel();
+      return absl::DataLossError(absl::StrCat("WatchFrames of session ", session_, ": records ", next_,
+                                              " to ", record.index(), " were dropped before they were read"));
+    }
     records_.push_back(tessera::read(record));
-    next_ = record.index() + 1;
+    ++next_;
   }
   const grpc::Status end = reader->Finish();
   const bool stopped = end.error_code() == grpc::StatusCode::CANCELLED && stopping_ && !once;
   if (end.ok() || stopped) return absl::OkStatus();
-  return {static_cast<absl::StatusCode>(end.error_code()),
-          absl::StrCat("WatchFrames of session ", session_, ": ", end.error_message())};
+  return to_status(end, absl::StrCat("WatchFrames of session ", session_));
 }
 
 StatusOr<std::vector<FrameRecord>> FrameReader::finish() {

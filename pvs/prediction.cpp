@@ -18,7 +18,6 @@ constexpr double kTurnUncertainty = 0.25;
 // Margins do not push a half angle past this (a pixel's share of the field shrinks with cos²): the views
 // along a fast turn cover what it sweeps.
 constexpr float kMaxHalfAngleRad = 1.2217305f;  // 70 degrees
-constexpr DurationNs kMaxViews = 64;
 
 // The rotation vector (axis times angle, at most pi) from `a` to `b` in the camera axes of `b`.
 dvec3 rotation_between(const dquat& a, const dquat& b) {
@@ -168,18 +167,20 @@ View view_at(const View& client, const Prediction& prediction, double ahead_s,
   return view;
 }
 
-// Times after `now_ns`: every step, and always the horizon.
-std::vector<DurationNs> steps(const PredictionSettings& settings) {
-  std::vector<DurationNs> out;
+}  // namespace
+
+// Every step, and always the horizon.
+std::vector<DurationNs> prediction_times(const PredictionSettings& settings) {
+  std::vector<DurationNs> out{0};
+  if (settings.mode == PredictionMode::none) return out;
   const DurationNs horizon = std::max<DurationNs>(0, settings.horizon_ns);
-  const DurationNs step = std::max({settings.step_ns, horizon / kMaxViews, DurationNs{1}});
+  const DurationNs most = std::max(2u, settings.max_views) - 1;  // after the first
+  const DurationNs step = std::max({settings.step_ns, (horizon + most - 1) / most, DurationNs{1}});
   // A last step shorter than a tenth of one is not worth a view.
   for (DurationNs t = step; t < horizon - step / 10; t += step) out.push_back(t);
   if (horizon > 0) out.push_back(horizon);
   return out;
 }
-
-}  // namespace
 
 std::vector<View> predict_views(std::span<const TimedPose> history, TimeNs now_ns, const View& client_view,
                                 const PredictionSettings& settings) {
@@ -199,7 +200,8 @@ std::vector<View> predict_views(std::span<const TimedPose> history, TimeNs now_n
   };
   add(0);
   if (age > 0 && 2 * age > settings.step_ns) add(age);
-  for (const DurationNs t : steps(settings)) add(age + t);
+  for (const DurationNs ahead : prediction_times(settings))
+    if (ahead > 0) add(age + ahead);
   return views;
 }
 

@@ -17,9 +17,11 @@ enum class PredictionMode {
 struct PredictionSettings {
   PredictionMode mode = PredictionMode::linear;
   DurationNs horizon_ns = 0;        // one round trip + one server period: how long the result must last
-  DurationNs step_ns = 33'333'333;  // time between predicted views
-  float base_margin = 0.2f;         // field of view grows by this share at rest (thesis: 20 %)
-  float max_margin_rad = 0.7f;      // per side
+  DurationNs step_ns = 33'333'333;  // time between predicted views; longer where max_views would be exceeded
+  // More latency means views further apart, not more of them: else a slow server would make itself slower.
+  uint32_t max_views = 8;
+  float base_margin = 0.2f;     // field of view grows by this share at rest (thesis: 20 %)
+  float max_margin_rad = 0.7f;  // per side
 };
 
 // Views for times from `now_ns` to `now_ns + horizon_ns`, first to last, the newest pose's own view first.
@@ -31,5 +33,8 @@ struct PredictionSettings {
 // count as standing still.
 std::vector<View> predict_views(std::span<const TimedPose> history, TimeNs now_ns, const View& client_view,
                                 const PredictionSettings& settings);
+
+// How far ahead of `now_ns` its views are, for a newest pose of that moment.
+std::vector<DurationNs> prediction_times(const PredictionSettings& settings);
 
 }  // namespace tessera::pvs

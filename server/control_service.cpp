@@ -92,6 +92,18 @@ void ControlService::open() {
   state_ = State::open;
 }
 
+StatusOr<SessionSettings> updated_settings(v1::SessionSettings& current, const v1::SessionSettings& wanted) {
+  v1::SessionSettings merged = current;
+  merged.MergeFrom(wanted);  // what is 0 stays
+  TESSERA_ASSIGN_OR_RETURN(const SessionSettings settings, session_settings(merged));
+  if (merged.atlas_width() != current.atlas_width() || merged.atlas_height() != current.atlas_height())
+    return absl::FailedPreconditionError(absl::StrCat(
+        "settings: a session's atlas keeps its ", current.atlas_width(), "x", current.atlas_height(),
+        " texels; create a session with another one and move the client to it"));
+  current = std::move(merged);
+  return settings;
+}
+
 void ControlService::drain() {
   {
     const std::lock_guard lock(mutex_);
@@ -164,7 +176,7 @@ v1::Scene ControlService::describe(const SceneInfo& info) const {
   }
   const std::lock_guard lock(mutex_);
   for (const auto& [id, session] : known_)
-    if (session.scene == info.name && server_.stats(id).ok()) scene.set_sessions(scene.sessions() + 1);
+    if (session.scene == info.name && server_.has(id)) scene.set_sessions(scene.sessions() + 1);
   return scene;
 }
 
@@ -200,6 +212,7 @@ grpc::Status ControlService::CreateSession(grpc::ServerContext*, const v1::Creat
   if (!ticket.ok()) return answer("CreateSession", ticket.status());
   {
     const std::lock_guard lock(mutex_);
+    std::erase_if(known_, [this](const auto& entry) { return !server_.has(entry.first); });
     known_[ticket->session] = std::move(known);
   }
   out->set_session(ticket->session);
@@ -271,13 +284,7 @@ Status ControlService::update(uint64_t session, const v1::SessionSettings& wante
     if (known == known_.end()) return absl::NotFoundError(absl::StrCat("there is no session ", session));
     merged = known->second.settings;
   }
-  const v1::SessionSettings before = merged;
-  merged.MergeFrom(wanted);  // what is 0 stays
-  TESSERA_ASSIGN_OR_RETURN(const SessionSettings settings, session_settings(merged));
-  if (merged.atlas_width() != before.atlas_width() || merged.atlas_height() != before.atlas_height())
-    return absl::FailedPreconditionError(absl::StrCat(
-        "settings: the atlas of session ", session, " keeps its ", before.atlas_width(), "x",
-        before.atlas_height(), " texels; create a session with another one and move the client to it"));
+  TESSERA_ASSIGN_OR_RETURN(const SessionSettings settings, updated_settings(merged, wanted));
   TESSERA_RETURN_IF_ERROR(
       server_.set_rate(session, settings.rate.bitrate_bps, settings.rate.frames_per_second));
   log_event(spdlog::level::info, "session updated",

@@ -88,5 +88,8 @@ class ControlService final : public v1::Control::Service {
 
 // Fills in defaults, checks ranges: InvalidArgument names the field.
 StatusOr<SessionSettings> session_settings(v1::SessionSettings& settings);
+// What `wanted` names replaces what is in `current`, or nothing does: InvalidArgument as above;
+// FailedPrecondition: another atlas.
+StatusOr<SessionSettings> updated_settings(v1::SessionSettings& current, const v1::SessionSettings& wanted);
 
 }  // namespace tessera::server

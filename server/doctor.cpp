@@ -5,7 +5,6 @@
 
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <memory>
 
 #include "codec/video_encoder.h"

@@ -13,8 +13,6 @@ namespace tessera::server {
 namespace {
 
 constexpr double kRtpClockHz = 90'000;
-// More latency means views further apart, not more of them: else a slow server would make itself slower.
-constexpr int64_t kMaxPredictedViews = 8;
 
 // Wall time since the last lap.
 class Stopwatch {
@@ -92,13 +90,10 @@ Status Session::Impl::find_visible(const FrameInput& input, FrameStats& stats) {
   horizon_ns =
       input.round_trip_ns + std::max(input.interval_ns, from_seconds(1.0 / settings.rate.frames_per_second));
   prediction.horizon_ns = horizon_ns;
-  prediction.step_ns = std::max(prediction.step_ns, horizon_ns / (kMaxPredictedViews - 1) + 1);
   views = pvs::predict_views(input.poses, newest.time_ns, settings.client_view, prediction);
   view_times.clear();
-  for (size_t i = 0; i < views.size(); ++i) {
-    view_times.push_back(newest.time_ns +
-                         std::min<DurationNs>(static_cast<int64_t>(i) * prediction.step_ns, horizon_ns));
-  }
+  for (const DurationNs ahead : pvs::prediction_times(prediction))
+    view_times.push_back(newest.time_ns + ahead);
 
   instant->set(input.scene_time_ns, newest.pose.position);
   TESSERA_RETURN_IF_ERROR(scene->lighting().update(*instant));

@@ -120,6 +120,7 @@ struct StreamServer::Impl {
   std::map<absl::StatusCode, uint64_t> refused_clients;
   transport::LogLimiter refusal_log;
   bool stopping = false, woken = false;
+  TimeNs idle_check_ns = 0;  // the next one
   std::thread io_thread, render_thread;
 };
 
@@ -159,7 +160,8 @@ void StreamServer::Impl::do_device_work(std::unique_lock<std::mutex>& lock) {
 
 // Whoever made them has forgotten them, or died: they must not take places for ever.
 void StreamServer::Impl::end_idle(std::unique_lock<std::mutex>& lock) {
-  if (settings.idle_timeout_ns == 0) return;
+  if (settings.idle_timeout_ns == 0 || clock.now() < idle_check_ns) return;
+  idle_check_ns = clock.now() + std::min(settings.idle_timeout_ns / 4, kNsPerSecond);
   std::vector<SessionId> idle;
   for (const auto& [id, entry] : sessions) {
     const std::optional<TimeNs> since = entry.session->idle_since();
@@ -438,6 +440,11 @@ StatusOr<std::vector<FrameRecord>> StreamServer::records(SessionId session, uint
                                                          uint64_t& next) const {
   TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, impl_->find(session));
   return found->records(first, next);
+}
+
+bool StreamServer::has(SessionId session) const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->sessions.contains(session);
 }
 
 size_t StreamServer::sessions() const {

@@ -81,6 +81,7 @@ class StreamServer {
   StatusOr<std::vector<FrameRecord>> records(transport::SessionId session, uint64_t first,
                                              uint64_t& next) const;
   StreamServerStats stats() const;
+  bool has(transport::SessionId session) const;
   size_t sessions() const;
 
   // Runs `work` on the render thread, between two frames, and waits for it: a device belongs to one thread.

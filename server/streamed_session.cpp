@@ -84,6 +84,7 @@ void StreamedSession::on_closed(const Status& reason) {
   prepared_ = false;
   idle_since_ns_ = clock_.now();
   stats_.ended = reason;
+  stats_.round_trip_ns = kFirstRoundTripNs;  // the next one comes another way
 }
 
 void StreamedSession::on_bound() {
@@ -91,10 +92,9 @@ void StreamedSession::on_bound() {
   bound_ = true;
 }
 
-Status StreamedSession::on_unbound() {
+void StreamedSession::on_unbound() {
   const std::lock_guard lock(mutex_);
   bound_ = false;  // until its next hello
-  return absl::OkStatus();
 }
 
 void StreamedSession::on_pose(const transport::SequencedPose& pose) {
@@ -219,7 +219,6 @@ void StreamedSession::count(const Frame& frame) {
   const std::lock_guard lock(mutex_);
   stats_.key_frames += frame.atlas.key_frame ? 1 : 0;
   stats_.meta_bytes += frame.meta.size();
-  stats_.encoder = renderer_->encoder();
   std::erase_if(sent_, [&](const auto& s) { return s.first <= now - kRateWindowNs; });
   sent_.emplace_back(now, frame.meta.size() + frame.atlas.bytes.size());
 }
@@ -250,7 +249,10 @@ Status StreamedSession::render() {
   renderer_->set_rate(work.rate);
   const StatusOr<double> budget =
       media_->frame_budget_bits(id_, from_seconds(1 / work.rate.frames_per_second), work.key_frame);
-  if (left(budget.status())) return on_unbound();
+  if (left(budget.status())) {
+    on_unbound();
+    return absl::OkStatus();
+  }
   if (!budget.ok()) return budget.status();
   if (*budget <= 0) {  // frames are dropped before they are encoded, never after
     if (work.key_frame) on_key_frame_request();
@@ -271,13 +273,15 @@ Status StreamedSession::render() {
                                               .key_frame = work.key_frame}));
   record.server.render_end = clock_.now();
   count(frame);
-  log_event(spdlog::level::debug, "frame rendered",
-            {{"session", id_},
-             {"frame", frame.number},
-             {"key_frame", frame.atlas.key_frame},
-             {"atlas_bytes", frame.atlas.bytes.size()},
-             {"meta_bytes", frame.meta.size()},
-             {"render_ms", frame.stats.times.total_ms()}});
+  if (spdlog::should_log(spdlog::level::debug)) {
+    log_event(spdlog::level::debug, "frame rendered",
+              {{"session", id_},
+               {"frame", frame.number},
+               {"key_frame", frame.atlas.key_frame},
+               {"atlas_bytes", frame.atlas.bytes.size()},
+               {"meta_bytes", frame.meta.size()},
+               {"render_ms", frame.stats.times.total_ms()}});
+  }
   if (on_rendered_) on_rendered_(frame.stats);
   const Status sent = send(work, frame, record);
   put_off();
@@ -295,7 +299,9 @@ Status StreamedSession::prepare(const Work& work) {
   settings.client_view = work.client_view;
   settings.rate = work.rate;
   TESSERA_ASSIGN_OR_RETURN(renderer_, make_renderer_(settings));
+  last_begin_ns_ = 0;
   const std::lock_guard lock(mutex_);
+  stats_.encoder = renderer_->encoder();
   prepared_ = !restart_;
   return absl::OkStatus();
 }
@@ -316,7 +322,10 @@ Status StreamedSession::send(const Work& work, const Frame& frame, FrameRecord r
   if (!work.connection->send(FrameType::meta, frame.meta).ok()) return absl::OkStatus();
   const StatusOr<uint32_t> sent =
       media_->send_frame(id_, record.server.render_begin, frame.atlas.bytes, frame.atlas.key_frame);
-  if (left(sent.status())) return on_unbound();
+  if (left(sent.status())) {
+    on_unbound();
+    return absl::OkStatus();
+  }
   on_sent(record.frame, clock_.now());
   if (!absl::IsResourceExhausted(sent.status())) return sent.status();
   on_key_frame_request();

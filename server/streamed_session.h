@@ -88,7 +88,7 @@ class StreamedSession {
     bool bound = false, key_frame = false;
     RateSplit rate;
   };
-  Status on_unbound();
+  void on_unbound();
   Status on_timing(std::span<const uint8_t> payload);
   Status answer_ping(std::span<const uint8_t> payload);
   Work take_work();

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <thread>
 
+#include "client-sdk/tools/made_ticket.h"
 #include "proto/control_access.h"
 #include "transport/asio/endpoint.h"
 
@@ -22,26 +23,28 @@ void limit(grpc::ClientContext& context) {
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
 }
 
-Status to_status(const grpc::Status& status) {
-  return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+// A daemon that was started a moment ago does not listen yet; then it loads its scenes, which may take a
+// minute.
+bool is_starting(const Status& status) {
+  return absl::IsUnavailable(status) && (absl::StrContains(status.message(), "Connection refused") ||
+                                         absl::StrContains(status.message(), "still loading"));
 }
 
-// A daemon that was started a moment ago does not listen before its scenes are loaded.
 Status create_session(v1::Control::Stub& control, const std::string& scene, v1::Ticket& ticket) {
   constexpr std::chrono::milliseconds kRetryInterval{250};
-  const auto give_up = std::chrono::steady_clock::now() + kCallTimeout;
+  constexpr std::chrono::seconds kLoadTime{120};
+  const auto start = std::chrono::steady_clock::now();
   v1::CreateSessionRequest request;
   request.set_scene(scene);
   while (true) {
     grpc::ClientContext context;
     limit(context);
-    const Status status = to_status(control.CreateSession(&context, request, &ticket));
-    const bool nobody_listens =
-        absl::IsUnavailable(status) && absl::StrContains(status.message(), "Connection refused");
-    if (!nobody_listens) return status;
-    if (std::chrono::steady_clock::now() > give_up)
-      return absl::UnavailableError(
-          absl::StrCat(status.message(), "; does tesserad run, and load its scenes still?"));
+    const Status status = to_status(control.CreateSession(&context, request, &ticket), "CreateSession");
+    if (!is_starting(status)) return status;
+    const bool listens = absl::StrContains(status.message(), "still loading");
+    if (std::chrono::steady_clock::now() - start > (listens ? kLoadTime : kCallTimeout))
+      return listens ? status
+                     : absl::UnavailableError(absl::StrCat(status.message(), "; does tesserad run?"));
     std::this_thread::sleep_for(kRetryInterval);
   }
 }
@@ -97,12 +100,8 @@ StatusOr<std::unique_ptr<ControlledSession>> ControlledSession::create(const Con
                         absl::StrCat("control at ", settings.endpoint, ": ", status.message()));
   session->id_ = made.session();
   session->scene_ = scene;
-  session->ticket_ = {.host = host_of(settings.endpoint),
-                      .meta_port = static_cast<uint16_t>(made.meta_port()),
-                      .authority_file = settings.authority_file};
-  if (made.token().size() != session->ticket_.token.size())
-    return absl::InternalError("the ticket's token has a wrong size");
-  std::ranges::copy(made.token(), session->ticket_.token.begin());
+  TESSERA_ASSIGN_OR_RETURN(session->ticket_, ticket_of(made, host_of(settings.endpoint)));
+  session->ticket_.authority_file = settings.authority_file;
   return session;
 }
 
@@ -110,7 +109,7 @@ StatusOr<v1::Box> ControlledSession::bounds() {
   grpc::ClientContext context;
   limit(context);
   v1::ListScenesResponse scenes;
-  TESSERA_RETURN_IF_ERROR(to_status(stub_->ListScenes(&context, {}, &scenes)));
+  TESSERA_RETURN_IF_ERROR(to_status(stub_->ListScenes(&context, {}, &scenes), "ListScenes"));
   for (const v1::Scene& scene : scenes.scenes())
     if (scene.name() == scene_) return scene.bounds();
   return absl::NotFoundError(absl::StrCat("the daemon holds no scene ", scene_, " any more"));

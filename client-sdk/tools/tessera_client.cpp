@@ -187,7 +187,8 @@ Status print_ticket(const Settings& s) {
   if (s.control.authority_file)
     tls = s.control.authority_file->empty() ? "" : absl::StrCat(" -cacert ", *s.control.authority_file);
   std::cerr << absl::StrFormat(
-      "session %u stays until it is deleted: grpcurl%s -d '{\"session\": %u}' %s "
+      "session %u ends when it has no client for the daemon's --idle-timeout, or is deleted: grpcurl%s -d "
+      "'{\"session\": %u}' %s "
       "tessera.v1.Control/DeleteSession\n",
       session->id(), tls, session->id(), s.control.endpoint);
   return absl::OkStatus();

@@ -36,6 +36,8 @@ inline LoopbackResult sample_result() {
   row.server_ms = 40;
   row.client_ms = 12;
   row.mssim_masked = 0.8765;
+  row.violations = 0;
+  row.samples_shaded = 1'000'000;
   result.rows = {
       row,
       {.method = "mesh-warp", .note = "depth is not counted", .error = {.mssim = 0.9}, .server_ms = 30},

@@ -61,7 +61,7 @@ TEST_F(Program, PrintsATicketThatItCanViewByItself) {
   ASSERT_EQ(run(viewer("--scene hall --print-ticket")), 0) << errors_;
   EXPECT_THAT(output_, StartsWith("tessera://127.0.0.1:" + std::to_string(daemon_->meta_port()) + "/"));
   EXPECT_EQ(sessions(), 1u) << "left to an app";
-  EXPECT_THAT(errors_, HasSubstr("session 1 stays until it is deleted"));
+  EXPECT_THAT(errors_, AllOf(HasSubstr("session 1 ends"), HasSubstr("--idle-timeout")));
   EXPECT_THAT(errors_, HasSubstr("tessera.v1.Control/DeleteSession"));
   EXPECT_THAT(errors_, Not(HasSubstr("tessera://"))) << "a secret";
   const std::string ticket = output_.substr(0, output_.find('\n'));

@@ -70,7 +70,7 @@ class Silence {
 
 TEST(Session, AServerThatSaysNothingIsATimeoutAtItsStep) {
   const Silence server;
-  Session session({.host = "127.0.0.1", .meta_port = server.port()}, settings(), from_ms(50));
+  Session session({.host = "127.0.0.1", .meta_port = server.port()}, settings(), kNsPerSecond / 2);
   const auto events = events_until_lost(session);
   ASSERT_EQ(events.size(), 2u);
   EXPECT_EQ(events[0].state, SessionState::connecting);
@@ -80,7 +80,7 @@ TEST(Session, AServerThatSaysNothingIsATimeoutAtItsStep) {
 
 TEST(Session, CanBeDestroyedWhileItConnects) {
   const Silence server;
-  Session session({.host = "127.0.0.1", .meta_port = server.port()}, settings(), from_ms(50));
+  Session session({.host = "127.0.0.1", .meta_port = server.port()}, settings(), kNsPerSecond / 2);
   EXPECT_FALSE(session.send_pose({1, {}}));
   EXPECT_FALSE(session.stats().has_value());
 }

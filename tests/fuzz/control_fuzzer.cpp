@@ -81,10 +81,18 @@ class Bench {
   void update(const std::string& bytes) {
     v1::UpdateSessionRequest request;
     v1::Session session;
-    if (!parse(bytes, request) || !service_.UpdateSession(nullptr, &request, &session).ok()) return;
-    require(session.session() == session_);
-    const auto& s = session.settings();
-    require(s.bitrate_mbps() >= 0 && s.bitrate_mbps() <= 1000 && s.frames_per_second() <= 240);
+    if (!parse(bytes, request)) return;
+    require(!service_.UpdateSession(nullptr, &request, &session).ok());  // the service made none
+    v1::SessionSettings before, after;
+    require(session_settings(before).ok());
+    after = before;
+    if (!updated_settings(after, request.settings()).ok()) {
+      require(after.SerializeAsString() == before.SerializeAsString());
+      return;
+    }
+    require(after.bitrate_mbps() >= 0.1 && after.bitrate_mbps() <= 1000);
+    require(after.frames_per_second() >= 1 && after.frames_per_second() <= 240);
+    require(after.atlas_width() == before.atlas_width() && after.atlas_height() == before.atlas_height());
   }
   void remove(const std::string& bytes) {
     v1::DeleteSessionRequest request;

@@ -38,7 +38,7 @@ TEST(Loopback, TheClientShowsWhatTheServerMeant) {
   const Row& row = result.rows[0];
   EXPECT_EQ(row.frames_displayed, 30u);
   EXPECT_EQ(result.frames.size(), 30u);
-  EXPECT_EQ(row.violations, 0u);
+  EXPECT_EQ(row.violations, 0u) << "looked for, and none";
   EXPECT_LE(*row.tiling_error_ms_max, 1.0);
   EXPECT_LT(*row.holes, 0.02);
   EXPECT_GT(*row.coverage, *row.coverage_without_prediction);

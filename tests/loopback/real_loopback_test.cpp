@@ -14,11 +14,11 @@
 namespace tessera::bench {
 namespace {
 
-StatusOr<LoopbackResult> run(LoopbackSettings s) {
+StatusOr<LoopbackResult> run(LoopbackSettings s, double server_fps = 10, double seconds = 1.5) {
   s.clock = "real";
-  s.seconds = 1.5;
+  s.seconds = seconds;
   s.fps = 20;
-  s.server_fps = 10;
+  s.server_fps = server_fps;
   s.size = {160, 90};
   s.atlas = {512, 256};
   s.score_every = 10;
@@ -52,13 +52,18 @@ TEST(RealLoopback, EveryFramesDurationsTileItsTime) {
   EXPECT_FALSE(result->plan.empty());
 }
 
-// Pictures of a client that stands still in a scene that does, too, depend on nothing but the frame's number.
+// Pictures of a client that stands still in a scene that does, too, depend on nothing but the frame's number,
+// as long as the server keeps its rate: a late frame may have more bits (RateSplit::at_interval).
 TEST(RealLoopback, PicturesAreThoseOfTheVirtualClock) {
   const TemporaryFolder folder;
   const std::string path = folder.path() / "still.csv";
   ASSERT_TRUE(write_file(path, "t_seconds,px,py,pz,qx,qy,qz,qw\n0,0,1.6,6,0,0,0,1\n").ok());
-  const auto real = run({.scene = "city:2000", .path = path});
+  const auto real = run({.scene = "city:2000", .path = path}, 2, 2.5);
   ASSERT_TRUE(real.ok()) << real.status();
+  const std::vector<FrameRecord>& records = real->records;
+  const auto late = std::ranges::adjacent_find(records, [](const FrameRecord& a, const FrameRecord& b) {
+    return b.server.render_begin - a.server.render_begin > kNsPerSecond;  // two periods
+  });
   LoopbackSettings s = real->settings;
   s.clock = "virtual";
   s.split = false;
@@ -77,7 +82,7 @@ TEST(RealLoopback, PicturesAreThoseOfTheVirtualClock) {
   size_t compared = 0;
   for (const DisplayRecord& frame : real->frames) {
     const auto same = of_frame.find(frame.frame);
-    if (same == of_frame.end()) continue;
+    if (same == of_frame.end() || (late != records.end() && frame.frame > late->frame)) continue;
     EXPECT_EQ(frame.mssim.at("tessera"), same->second) << "frame " << frame.frame;
     ++compared;
   }

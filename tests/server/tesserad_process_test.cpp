@@ -185,6 +185,24 @@ TEST_F(Process, ItAnswersWhileScenesLoad) {
   EXPECT_EQ(log().find("serving"), std::string::npos) << "too quick to show anything";
 }
 
+// A newcomer starts the daemon and, at once, a viewer.
+TEST_F(Process, AViewerWaitsForADaemonThatLoadsItsScenes) {
+  start({.scenes = {}});
+  const uint16_t port = daemon_->control_port();  // free once this one is gone
+  daemon_.reset();
+  ChildProcess viewer(absl::StrCat(TESSERA_CLIENT, " --control 127.0.0.1:", port,
+                                   " --scene last --width 64 --height 48 --seconds 0.1"),
+                      folder_.file("viewer"));
+  std::string scenes;
+  for (int i = 0; i < 12; ++i) scenes += absl::StrCat(" --scene s", i, "=city:200000");
+  run(absl::StrCat(
+      scenes, " --scene last=gallery:0 --meta-port 0 --media-port 0 --http-port 0 --control-port ", port));
+  ASSERT_TRUE(logged("serving ")) << log();
+  ASSERT_TRUE(eventually([&] { return viewer.exit_code().has_value(); }));
+  const auto said = transport::test::read_file(folder_.file("viewer"));
+  EXPECT_EQ(viewer.exit_code(), 0) << std::string(said.begin(), said.end());
+}
+
 // One line, and none of gRPC's own.
 TEST_F(Process, ABusyPortIsOneLineThatSaysWhatToDo) {
   start({.scenes = {}});

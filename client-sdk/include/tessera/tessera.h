@@ -103,7 +103,7 @@ typedef struct TesseraSessionCreateInfo { /* TESSERA_TYPE_SESSION_CREATE_INFO */
   uint32_t viewHeight;
   TesseraFov fov;         /* of the head: what either eye sees */
   float displayRate;      /* Hz, 1..1000 */
-  int64_t connectTimeout; /* ns, up to 60 s, for all addresses of the host together; 0: 8 s */
+  int64_t connectTimeout; /* ns, up to 60 s, for all addresses together, once the name is resolved; 0: 8 s */
 } TesseraSessionCreateInfo;
 
 typedef struct TesseraPoseInfo { /* TESSERA_TYPE_POSE_INFO */
@@ -209,7 +209,8 @@ TESSERA_API int64_t tesseraGetTime(void);
 /* Any thread. Returns at once; events tell how it goes. A ticket serves one session at a time. */
 TESSERA_API TesseraResult tesseraCreateSession(const TesseraSessionCreateInfo* info, TesseraSession* session);
 /* Any thread. Tells the server; may wait for the network, up to connectTimeout (and a second) while it is
- * still connecting. TESSERA_ERROR_CALL_ORDER: it has renderers. NULL is no error. */
+ * still connecting, or for the resolver of names. TESSERA_ERROR_CALL_ORDER: it has renderers. NULL is no
+ * error. */
 TESSERA_API TesseraResult tesseraDestroySession(TesseraSession session);
 
 /* Any thread. The next event, in this order: connecting, streaming, first picture, frames, lost. */
