@@ -188,6 +188,18 @@ float select_bias(std::span<const float> ideal_areas, double target_texels, cons
   return std::min(settings.max_bias, settings.min_bias + kStep * static_cast<float>(enough));
 }
 
+float BiasFollower::follow(float needed) {
+  constexpr float kSlack = 0.25f;     // the bias may be this much larger than needed
+  constexpr float kStep = 1.0f / 16;  // and falls this much a frame beyond
+  if (!has_bias_ || needed > bias_) {
+    bias_ = needed;
+  } else if (needed + kSlack < bias_) {
+    bias_ = std::max(needed + kSlack, bias_ - kStep);
+  }
+  has_bias_ = true;
+  return bias_;
+}
+
 void AdaptiveTarget::on_out_of_memory() {
   constexpr double kShrink = 0.92, kMinShare = 0.25;
   share_ = std::max(kMinShare, share_ * kShrink);

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "atlas/placement.h"
+#include "atlas/patch_traits.h"
 #include "scene/visible_set.h"
 
 namespace tessera::atlas {
@@ -20,11 +20,12 @@ struct LevelSettings {
   float color_area_px2 = 1.5f;  // biased area below which a patch becomes a single colour
 };
 
-// The patch's traits that level selection needs.
-struct PatchTraits {
-  uint8_t triangle_count = 1;  // a lone triangle fills half of its block
-  bool masked = false;         // needs two halves
+// Binary logarithms of a block's sides in texels; width >= height; kMinLog..log2(superblock side).
+struct Level {
+  uint8_t log_w = 0, log_h = 0;
+  bool operator==(const Level&) const = default;
 };
+constexpr uint8_t kMinLog = 1;  // 2 texels: a block owns its 4:2:0 chroma samples
 
 struct LevelWish {
   bool single_color = false;
@@ -55,6 +56,17 @@ LevelWish select_level(const BlockNeed& need, bool masked, float bias, const Lev
 // its value where blocks are not clamped at either end, rounded, or replaced by a colour; here all of that
 // counts. Monotonic: a smaller target never gives a smaller bias. Clamped to [min_bias, max_bias].
 float select_bias(std::span<const float> ideal_areas, double target_texels, const LevelSettings& settings);
+
+// The bias stays between what is needed and a little more, so that a camera that sways does not move it.
+class BiasFollower {
+ public:
+  // `needed`: of this frame, by select_bias(). Returns the one to use.
+  float follow(float needed);
+
+ private:
+  float bias_ = 0;
+  bool has_bias_ = false;
+};
 
 // The target S, calibrated by experience (thesis 3.5): a reset because memory ran out shrinks it, quiet time
 // grows it.

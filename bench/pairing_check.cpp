@@ -8,16 +8,16 @@ namespace tessera::bench {
 namespace {
 
 // Address of one triangle; single colours count without their value.
-using Address = std::tuple<bool, uint16_t, uint16_t, uint8_t, uint8_t, bool>;
+using Address = std::tuple<bool, uint16_t, uint16_t, uint16_t, uint16_t, bool>;
 
 Address address_of(const client::TriangleFields& r) {
   if (r.single_color) return {true, 0, 0, 0, 0, false};
-  return {false, r.x, r.y, r.log_w, r.log_h, r.transposed};
+  return {false, r.x, r.y, r.width, r.height, r.transposed};
 }
 
 Address address_of(const atlas::Placement& p) {
   if (p.kind == atlas::PlacementKind::color) return {true, 0, 0, 0, 0, false};
-  return {false, p.x, p.y, p.level.log_w, p.level.log_h, p.transposed};
+  return {false, p.x, p.y, p.width, p.height, p.transposed};
 }
 
 }  // namespace

@@ -54,6 +54,8 @@ void for_each_option(Settings& s, Visitor&& visit) {
 }
 
 const std::map<std::string, Codec> kCodecs{{"h264", Codec::h264}};
+const std::map<std::string, atlas::LayoutKind> kLayouts{{"blocks", atlas::LayoutKind::blocks},
+                                                        {"coherent", atlas::LayoutKind::coherent}};
 const std::map<std::string, Truth> kTruths{{"4x", Truth::supersampled}, {"1x", Truth::one}};
 const std::map<std::string, Prediction> kPredictions{{"linear", Prediction::linear},
                                                      {"none", Prediction::none}};
@@ -85,6 +87,10 @@ struct AddOption {
     CLI::Option* option =
         field ? app.add_option("--" + name, field, meaning) : app.add_flag("--" + name, field, meaning);
     finish(option, group, name);
+  }
+  void operator()(const char* group, const std::string& name, atlas::LayoutKind& field,
+                  const char* meaning) const {
+    add_choice(group, name, field, meaning, kLayouts);
   }
   void operator()(const char* group, const std::string& name, Codec& field, const char* meaning) const {
     add_choice(group, name, field, meaning, kCodecs);
@@ -120,6 +126,9 @@ struct WriteJson {
   }
   void operator()(const char*, const char* name, const Size& field, const char*) const {
     out[name] = absl::StrCat(field.width, "x", field.height);
+  }
+  void operator()(const char*, const char* name, atlas::LayoutKind field, const char*) const {
+    out[name] = name_of(kLayouts, field);
   }
   void operator()(const char*, const char* name, Codec field, const char*) const {
     out[name] = name_of(kCodecs, field);
@@ -169,7 +178,6 @@ void add_checks(CLI::App& app) {
   check("--size", sizes(8192, 2, 2));
   check("--atlas", sizes(8192, 8, 2));
   check("--fov-y", CLI::Range(1.0, 179.0));
-  check("--layout", CLI::IsMember({"blocks"}));
   check("--bitrate-mbps", CLI::Range(0.01, 10000.0));
   check("--delay-ms", CLI::Range(0.0, 10000.0));
   check("--jitter-ms", CLI::Range(0.0, 10000.0));

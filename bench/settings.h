@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "atlas/layout.h"
 #include "base/status.h"
 #include "gpu/device.h"
 
@@ -44,7 +45,7 @@ struct LoopbackSettings {
   double server_fps = 30;
   double server_ms = 33.3;  // charged to a server frame in virtual time
   Size atlas{2048, 1024};
-  std::string layout = "blocks";
+  atlas::LayoutKind layout = atlas::LayoutKind::blocks;
   Codec codec = Codec::h264;
   double bitrate_mbps = 20;  // atlas and meta together
   Prediction pvs = Prediction::linear;

@@ -14,7 +14,7 @@ namespace {
 server::SessionSettings session_settings(const LoopbackSettings& s) {
   server::SessionSettings out;
   out.client_view = client_view(s);
-  out.layout = atlas::blocks::settings_for(s.atlas.width, s.atlas.height);
+  out.layout = atlas::layout_settings(s.layout, s.atlas.width, s.atlas.height);
   out.prediction.mode = s.pvs == Prediction::none ? pvs::PredictionMode::none : pvs::PredictionMode::linear;
   out.rate.bitrate_bps = s.bitrate_mbps * 1e6;
   out.rate.frames_per_second = s.server_fps;

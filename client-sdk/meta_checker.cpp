@@ -88,15 +88,18 @@ Status check_patch(size_t entry, const NewPatch& patch, size_t vertices, size_t 
 }
 
 Status check_block(size_t entry, const PatchPlacement& p, uint32_t atlas_width, uint32_t atlas_height) {
-  if (p.log_w < 1 || p.log_w > 8 || p.log_h < 1 || p.log_h > 8) {
-    return bad("placements.log_w, log_h of entry ", entry, " are ", int{p.log_w}, ", ", int{p.log_h},
-               "; they must be 1 to 8");
+  for (const uint32_t side : {p.width, p.height}) {
+    if (side < 2 || side > geometry_compression::kMaxBlockSide || side % 2 != 0)
+      return bad("placements.width, height of entry ", entry, " are ", p.width, ", ", p.height,
+                 "; they must be even, 2 to ", geometry_compression::kMaxBlockSide);
   }
-  if (p.x % 2 != 0 || p.y % 2 != 0 || p.x + (1u << p.log_w) > atlas_width ||
-      p.y + (1u << p.log_h) > atlas_height) {
-    return bad("placements.x, y of entry ", entry, " are ", p.x, ", ", p.y, ": a block of ", 1u << p.log_w,
-               "x", 1u << p.log_h, " must lie at even texels inside the atlas of ", atlas_width, "x",
-               atlas_height);
+  if (p.x % 2 != 0 || p.y % 2 != 0 || p.x + p.width > atlas_width || p.y + p.height > atlas_height) {
+    return bad("placements.x, y of entry ", entry, " are ", p.x, ", ", p.y, ": a block of ", p.width, "x",
+               p.height, " must lie at even texels inside the atlas of ", atlas_width, "x", atlas_height);
+  }
+  for (const int code : p.spacing) {
+    if (code < -126 || code > 126)
+      return bad("placements.spacing of entry ", entry, " is ", code, ", not within -126..126");
   }
   return absl::OkStatus();
 }

@@ -1,4 +1,4 @@
-// What the client knows of the scene, in the form its GPU reads: one 16-byte record a triangle
+// What the client knows of the scene, in the form its GPU reads: one 32-byte record a triangle
 // (docs/protocol.md).
 #pragma once
 
@@ -12,20 +12,19 @@
 
 namespace tessera::client {
 
-// Vertex ids below 2^22, objects below 2^20. Fields by bit, least significant first:
-//   a: vertex0 (22) | corner kind (3) | transposed (1) | masked (1) | reversed (1)
-//   b: vertex1 (22) | object bits 0..9 (10)
-//   c: vertex2 (22) | object bits 10..19 (10)
-//   d: block: x/2 (12) | y/2 (12) | log_w (3, minus 1) | log_h (3, minus 1) | 0 (2);  colour: 0xBBGGRR (24) |
-//   0 (7) | 1
+// Two texels of four numbers. Fields by bit, least significant first:
+//   vertices: ids of the three corners;  object (24) | corner kind (3) | transposed | masked | reversed |
+//   single colour (1) shape:    block: x (16) | y (16);  width (16) | height (16);  spacing codes of the
+//   three corners (8 each);  0
+//             colour: 0xBBGGRR;  0;  0;  0
 // Corner kind: 0 = lone triangle; 1, 2 = of a pair; 3, 4, 5 = of three. It belongs to the stored order of the
 // vertices. Reversed: the corners are visited in the order 0, 2, 1, which undoes the winding of a mirrored
-// object; vertices and block coordinates swap together, so the corner kind needs no mirrored twin.
+// object; vertices, block coordinates and spacing swap together, so the corner kind needs no mirrored twin.
 struct TriangleRecord {
-  uint32_t a, b, c, d;
+  std::array<uint32_t, 4> vertices{}, shape{};
   bool operator==(const TriangleRecord&) const = default;
 };
-static_assert(sizeof(TriangleRecord) == 16);
+static_assert(sizeof(TriangleRecord) == 32);
 
 // The fields of a record, apart.
 struct TriangleFields {
@@ -34,9 +33,9 @@ struct TriangleFields {
   uint8_t corner_kind = 0;
   bool transposed = false, masked = false, reversed = false;
   bool single_color = false;
-  uint16_t x = 0, y = 0;         // of a block; even, < 8192
-  uint8_t log_w = 1, log_h = 1;  // of a block; 1..8
-  uint32_t rgb = 0;              // of a single colour: 0xBBGGRR
+  uint16_t x = 0, y = 0, width = 0, height = 0;  // of a block
+  std::array<int8_t, 3> spacing{};               // of a block, a corner of the triangle (meta_frame.h)
+  uint32_t rgb = 0;                              // of a single colour: 0xBBGGRR
   bool operator==(const TriangleFields&) const = default;
 };
 TriangleRecord pack(const TriangleFields& fields);

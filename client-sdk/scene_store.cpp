@@ -74,14 +74,16 @@ void SceneStore::place(const Placement& placement) {
                         .single_color = placement.kind == PlacementKind::color,
                         .x = placement.x,
                         .y = placement.y,
-                        .log_w = placement.log_w,
-                        .log_h = placement.log_h,
+                        .width = placement.width,
+                        .height = placement.height,
                         .rgb = placement.rgb};
   const int group = group_of(patch);
   auto& records = state_.records[group];
   for (uint32_t t = 0; t < patch.triangles; ++t) {
     for (int corner = 0; corner < 3; ++corner) {
-      fields.vertices[corner] = patch.vertices[kTriangles[patch.triangles - 1][t][corner]];
+      const uint8_t of_patch = kTriangles[patch.triangles - 1][t][corner];
+      fields.vertices[corner] = patch.vertices[of_patch];
+      fields.spacing[corner] = of_patch == 0 ? int8_t{0} : placement.spacing[of_patch - 1u];
     }
     fields.corner_kind = static_cast<uint8_t>(kFirstCornerKind[patch.triangles - 1] + t);
     if (patch.records[t] == kNoRecord) {

@@ -55,15 +55,21 @@ struct NewPatch {
   bool operator==(const NewPatch&) const = default;
 };
 
+constexpr uint16_t kMaxBlockSide = 256;
+
 enum class PlacementKind : uint8_t { none = 0, block = 1, color = 2 };
 
 struct PatchPlacement {
   uint32_t patch = 0;
   PlacementKind kind = PlacementKind::none;
-  uint16_t x = 0, y = 0;         // kind block: texels, even, < 8192
-  uint8_t log_w = 0, log_h = 0;  // kind block: 1..8
-  bool transposed = false;       // kind block
-  uint32_t rgb = 0;              // kind color: 0xBBGGRR, sRGB
+  // Kind block. Texels: x and y even, < 8192; width and height even, 2..kMaxBlockSide.
+  uint16_t x = 0, y = 0;
+  uint16_t width = 0, height = 0;
+  bool transposed = false;
+  // Of corners 1..4: log2 of the corner's distance from the eye that the block was made for, over that of
+  // corner 0, in steps of 6/127; -127..127. 0 for corners that the patch has not.
+  std::array<int8_t, 4> spacing{};
+  uint32_t rgb = 0;  // kind color: 0xBBGGRR, sRGB
   bool operator==(const PatchPlacement&) const = default;
 };
 

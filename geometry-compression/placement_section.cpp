@@ -1,6 +1,9 @@
-// Placements: which patches, and where their samples lie. Blocks of power-of-two sides mostly stand on
-// multiples of their sides, and one after another.
+// Placements: which patches, and where their samples lie. Blocks often stand one after another; those of
+// power-of-two sides mostly on multiples of their sides.
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <tuple>
 
 #include "geometry-compression/columns.h"
 #include "geometry-compression/sections.h"
@@ -9,8 +12,6 @@ namespace tessera::geometry_compression {
 namespace {
 
 constexpr uint32_t kMaxPosition = 8192;
-constexpr uint32_t kMinLog = 1, kMaxLog = 8;
-
 // `kind` on the wire: the frequent one is 0.
 constexpr uint32_t coded_kind(PlacementKind kind) {
   return kind == PlacementKind::block ? 0 : kind == PlacementKind::none ? 1 : 2;
@@ -21,60 +22,91 @@ constexpr PlacementKind kKinds[] = {PlacementKind::block, PlacementKind::none, P
 enum PositionRule : uint32_t { kSpelledOut = 0, kRightOf = 1, kBelow = 2 };
 
 PositionRule rule_for(const PatchPlacement& block, const PatchPlacement& previous) {
-  if (block.y == previous.y && block.x == previous.x + (1u << previous.log_w)) return kRightOf;
-  if (block.x == previous.x && block.y == previous.y + (1u << previous.log_h)) return kBelow;
+  if (block.y == previous.y && block.x == previous.x + previous.width) return kRightOf;
+  if (block.x == previous.x && block.y == previous.y + previous.height) return kBelow;
   return kSpelledOut;
 }
 
-// How many low bits of a position are zero for every block of these sides in the packet.
-struct Alignment {
-  bool to_sides = false;  // else to 2 texels
-  uint32_t x(const PatchPlacement& p) const { return to_sides ? p.log_w : 1; }
-  uint32_t y(const PatchPlacement& p) const { return to_sides ? p.log_h : 1; }
+// What all blocks of the packet have in common.
+struct Grid {
+  bool powers_of_two = false;  // sides
+  bool aligned = false;        // positions to sides, which are powers of two; else to 2 texels
+  uint32_t x_zeros(const PatchPlacement& p) const { return aligned ? log2_of(p.width) : 1; }
+  uint32_t y_zeros(const PatchPlacement& p) const { return aligned ? log2_of(p.height) : 1; }
+  // A side as a small number, and back.
+  uint32_t code(uint16_t side) const { return powers_of_two ? log2_of(side) - 1 : side / 2u - 1; }
+  uint64_t side(uint32_t code) const {
+    return powers_of_two ? uint64_t{2} << std::min(code, 32u) : 2 * (uint64_t{code} + 1);
+  }
+
+ private:
+  static uint32_t log2_of(uint16_t side) { return static_cast<uint32_t>(std::countr_zero(side)); }
 };
 
-Alignment alignment_of(std::span<const PatchPlacement> placements) {
-  return {std::all_of(placements.begin(), placements.end(), [](const PatchPlacement& p) {
-    return p.kind != PlacementKind::block || (p.x % (1u << p.log_w) == 0 && p.y % (1u << p.log_h) == 0);
-  })};
+Grid grid_of(std::span<const PatchPlacement> placements) {
+  Grid grid{true, true};
+  for (const PatchPlacement& p : placements) {
+    if (p.kind != PlacementKind::block) continue;
+    grid.powers_of_two &= std::has_single_bit(p.width) && std::has_single_bit(p.height);
+    grid.aligned &= grid.powers_of_two && p.x % p.width == 0 && p.y % p.height == 0;
+  }
+  grid.aligned &= grid.powers_of_two;
+  return grid;
 }
 
 // Before the first block.
 PatchPlacement origin() {
   PatchPlacement p;
-  p.log_w = p.log_h = kMinLog;
+  p.width = p.height = 2;
   return p;
 }
 
+constexpr size_t kSpacings = std::tuple_size_v<decltype(PatchPlacement::spacing)>;
+
+// Distances change about linearly over a patch: the far corners follow from the near ones.
+int predicted_spacing(const PatchPlacement& p, size_t corner) {
+  return corner == 2 ? p.spacing[0] + p.spacing[1] : corner == 3 ? p.spacing[2] + p.spacing[0] : 0;
+}
+
 struct BlockColumns {
-  std::vector<uint32_t> log_w, log_h, transposed, rule, x, y;
+  std::vector<uint32_t> width, height, transposed, rule, x, y;
+  std::array<std::vector<uint32_t>, kSpacings> spacing;
 };
 
+void add_spacing(BlockColumns& c, const PatchPlacement& p) {
+  for (size_t i = 0; i < kSpacings; ++i)
+    c.spacing[i].push_back(
+        delta(static_cast<uint32_t>(p.spacing[i]), static_cast<uint32_t>(predicted_spacing(p, i))));
+}
+
 void write_blocks(BitWriter& out, std::span<const PatchPlacement> placements) {
-  const Alignment alignment = alignment_of(placements);
+  const Grid grid = grid_of(placements);
   BlockColumns c;
+  bool spaced = false;
   PatchPlacement previous = origin();
   for (const PatchPlacement& p : placements) {
     if (p.kind != PlacementKind::block) continue;
-    c.log_w.push_back(delta(p.log_w, previous.log_w));
+    c.width.push_back(delta(grid.code(p.width), grid.code(previous.width)));
     // Blocks are nearly square.
-    c.log_h.push_back(delta(p.log_h, p.log_w));
+    c.height.push_back(delta(grid.code(p.height), grid.code(p.width)));
     c.transposed.push_back(p.transposed);
     const PositionRule rule = rule_for(p, previous);
     c.rule.push_back(rule);
     if (rule == kSpelledOut) {
-      c.x.push_back(p.x >> alignment.x(p));
-      c.y.push_back(p.y >> alignment.y(p));
+      c.x.push_back(p.x >> grid.x_zeros(p));
+      c.y.push_back(p.y >> grid.y_zeros(p));
     }
+    add_spacing(c, p);
+    spaced |= p.spacing != decltype(p.spacing){};
     previous = p;
   }
-  out.put(alignment.to_sides, 1);
-  write_column(out, c.log_w);
-  write_column(out, c.log_h);
-  write_column(out, c.transposed);
-  write_column(out, c.rule);
-  write_column(out, c.x);
-  write_column(out, c.y);
+  out.put(grid.powers_of_two, 1);
+  out.put(grid.aligned, 1);
+  out.put(spaced, 1);
+  for (const auto* column : {&c.width, &c.height, &c.transposed, &c.rule, &c.x, &c.y})
+    write_column(out, *column);
+  if (!spaced) return;
+  for (const auto& column : c.spacing) write_column(out, column);
 }
 
 void write_colors(BitWriter& out, std::span<const PatchPlacement> placements) {
@@ -91,38 +123,45 @@ void write_colors(BitWriter& out, std::span<const PatchPlacement> placements) {
   }
 }
 
-BlockColumns read_block_columns(BitReader& in, uint32_t count) {
+BlockColumns read_block_columns(BitReader& in, uint32_t count, bool spaced) {
   BlockColumns c;
-  c.log_w = read_column(in, count);
-  c.log_h = read_column(in, count);
+  c.width = read_column(in, count);
+  c.height = read_column(in, count);
   c.transposed = read_column(in, count);
   c.rule = read_column(in, count);
   const auto spelled_out = static_cast<uint32_t>(std::count(c.rule.begin(), c.rule.end(), kSpelledOut));
   c.x = read_column(in, spelled_out);
   c.y = read_column(in, spelled_out);
+  for (auto& column : c.spacing) column = spaced ? read_column(in, count) : std::vector<uint32_t>(count);
   return c;
 }
 
-// Empty, or what is wrong with block number `i` of `c`.
-std::string read_block(const BlockColumns& c, size_t i, size_t& next_position, Alignment alignment,
-                       const PatchPlacement& previous, PatchPlacement& p) {
-  const uint32_t log_w = undelta(c.log_w[i], previous.log_w);
-  const uint32_t log_h = undelta(c.log_h[i], log_w);
-  if (log_w < kMinLog || log_w > kMaxLog || log_h < kMinLog || log_h > kMaxLog)
-    return "a block's log is not 1..8";
+// The readers below give an empty string, or what is wrong with block number `i` of `c`.
+
+std::string read_size(const BlockColumns& c, size_t i, Grid grid, const PatchPlacement& previous,
+                      PatchPlacement& p) {
+  const uint32_t width_code = undelta(c.width[i], grid.code(previous.width));
+  const uint64_t width = grid.side(width_code), height = grid.side(undelta(c.height[i], width_code));
+  if (width > kMaxBlockSide || height > kMaxBlockSide)
+    return "a block's side is not 2.." + std::to_string(kMaxBlockSide);
+  p.width = static_cast<uint16_t>(width);
+  p.height = static_cast<uint16_t>(height);
+  return {};
+}
+
+std::string read_position(const BlockColumns& c, size_t i, size_t& next_position, Grid grid,
+                          const PatchPlacement& previous, PatchPlacement& p) {
   if (c.transposed[i] > 1 || c.rule[i] > kBelow) return "unknown flag or position rule";
-  p.log_w = static_cast<uint8_t>(log_w);
-  p.log_h = static_cast<uint8_t>(log_h);
   p.transposed = c.transposed[i] != 0;
   uint64_t x = previous.x, y = previous.y;
   if (c.rule[i] == kSpelledOut) {
-    x = uint64_t{c.x[next_position]} << alignment.x(p);
-    y = uint64_t{c.y[next_position]} << alignment.y(p);
+    x = uint64_t{c.x[next_position]} << grid.x_zeros(p);
+    y = uint64_t{c.y[next_position]} << grid.y_zeros(p);
     ++next_position;
   } else if (c.rule[i] == kRightOf) {
-    x += 1u << previous.log_w;
+    x += previous.width;
   } else {
-    y += 1u << previous.log_h;
+    y += previous.height;
   }
   if (x >= kMaxPosition || y >= kMaxPosition) return "a block's position is not below 8192";
   p.x = static_cast<uint16_t>(x);
@@ -130,17 +169,34 @@ std::string read_block(const BlockColumns& c, size_t i, size_t& next_position, A
   return {};
 }
 
+std::string read_spacing(const BlockColumns& c, size_t i, bool spaced, PatchPlacement& p) {
+  if (!spaced) return {};
+  for (size_t corner = 0; corner < kSpacings; ++corner) {
+    const auto code = static_cast<int32_t>(
+        undelta(c.spacing[corner][i], static_cast<uint32_t>(predicted_spacing(p, corner))));
+    if (code < -126 || code > 126) return "a block's spacing is not -126..126";
+    p.spacing[corner] = static_cast<int8_t>(code);
+  }
+  return {};
+}
+
 std::string read_blocks(BitReader& in, uint32_t count, std::vector<PatchPlacement>& placements) {
-  const Alignment alignment{in.get(1) != 0};
-  const BlockColumns columns = read_block_columns(in, count);
+  Grid grid;
+  grid.powers_of_two = in.get(1) != 0;
+  grid.aligned = in.get(1) != 0;
+  const bool spaced = in.get(1) != 0;
+  if (grid.aligned && !grid.powers_of_two) return "blocks are aligned to sides that are no powers of two";
+  const BlockColumns columns = read_block_columns(in, count, spaced);
   if (!in.ok()) return {};
   PatchPlacement previous = origin();
   size_t next_block = 0, next_position = 0;
   for (PatchPlacement& p : placements) {
     if (p.kind != PlacementKind::block) continue;
-    if (std::string error = read_block(columns, next_block++, next_position, alignment, previous, p);
-        !error.empty())
-      return "placement of patch " + std::to_string(p.patch) + ": " + error;
+    std::string error = read_size(columns, next_block, grid, previous, p);
+    if (error.empty()) error = read_position(columns, next_block, next_position, grid, previous, p);
+    if (error.empty()) error = read_spacing(columns, next_block, spaced, p);
+    if (!error.empty()) return "placement of patch " + std::to_string(p.patch) + ": " + error;
+    ++next_block;
     previous = p;
   }
   return {};

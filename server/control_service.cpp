@@ -50,7 +50,7 @@ StatusOr<SessionSettings> session_settings(v1::SessionSettings& s) {
   TESSERA_RETURN_IF_ERROR(set_checked(mbps, 20.0, 0.1, 1000.0, "settings.bitrate_mbps"));
   TESSERA_RETURN_IF_ERROR(set_checked(fps, 30.0, 1.0, 240.0, "settings.frames_per_second"));
   SessionSettings settings;
-  settings.layout = atlas::blocks::settings_for(width, height);
+  settings.layout = atlas::layout_settings(atlas::LayoutKind::blocks, width, height);
   const uint32_t side = 1u << settings.layout.superblock_log;
   if (width % 8 || height % 8 || width % side || height % side) {
     return absl::InvalidArgumentError(absl::StrCat("settings: an atlas of ", width, "x", height,

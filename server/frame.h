@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "atlas/blocks/layout.h"
+#include "atlas/layout.h"
 #include "base/frame_number.h"
 #include "base/status.h"
 #include "base/view.h"
@@ -22,7 +22,7 @@ namespace tessera::server {
 
 struct SessionSettings {
   View client_view;  // the client's resolution and field of view; its pose is ignored
-  atlas::blocks::LayoutSettings layout;
+  atlas::LayoutSettings layout;
   pvs::PredictionSettings prediction;  // horizon_ns is set for every frame
   pvs::VisibilitySettings visibility;
   shading::GatherPath gather_path = shading::GatherPath::automatic;
@@ -51,7 +51,7 @@ struct FrameStats {
   size_t visible_patches = 0;  // seen in this frame's views
   size_t placed_patches = 0;   // with those that stay for one round trip
   pvs::VisibilityStats visibility;
-  atlas::blocks::LayoutStats layout;
+  atlas::LayoutStats layout;
   shading::GatherStats gather;
   geometry_compression::MetaBits meta_bits;
 };

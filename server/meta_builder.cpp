@@ -52,8 +52,9 @@ gc::PatchPlacement to_wire(const atlas::Placement& p, uint32_t patch, uint32_t c
   out.kind = gc::PlacementKind::block;
   out.x = p.x;
   out.y = p.y;
-  out.log_w = p.level.log_w;
-  out.log_h = p.level.log_h;
+  out.width = p.width;
+  out.height = p.height;
+  out.spacing = p.spacing;
   out.transposed = p.transposed;
   return out;
 }

@@ -43,7 +43,7 @@ struct Session::Impl {
   std::unique_ptr<scene::SceneInstant> instant;
   std::unique_ptr<pvs::Visibility> visibility;
   std::optional<pvs::Retention> retention;
-  std::unique_ptr<atlas::blocks::Layout> layout;
+  std::unique_ptr<atlas::Layout> layout;
   std::unique_ptr<shading::Gather> gather;
   std::unique_ptr<codec::YuvConverter> converter;
   std::unique_ptr<codec::VideoEncoder> encoder;
@@ -67,7 +67,7 @@ Status Session::Impl::set_up() {
   TESSERA_ASSIGN_OR_RETURN(instant, scene::SceneInstant::create(device, scene->gpu_scene()));
   TESSERA_ASSIGN_OR_RETURN(visibility,
                            pvs::Visibility::create(device, scene->gpu_scene(), settings.visibility));
-  TESSERA_ASSIGN_OR_RETURN(layout, atlas::blocks::Layout::create(scene->scene(), settings.layout));
+  TESSERA_ASSIGN_OR_RETURN(layout, atlas::create_layout(scene->scene(), settings.layout));
   const shading::GatherSettings gather_settings{settings.layout.width, settings.layout.height,
                                                 settings.gather_path};
   TESSERA_ASSIGN_OR_RETURN(
@@ -161,7 +161,8 @@ StatusOr<Frame> Session::render(const FrameInput& input) {
   const scene::VisiblePatches kept = impl_->retention->update(frame.pose.time_ns, impl_->seen);
   times.visibility_ms = watch.lap_ms();
 
-  const atlas::LayoutDelta delta = impl_->layout->update(kept);
+  const atlas::LayoutDelta delta =
+      impl_->layout->update({kept, frame.pose.pose.position, impl_->instant->instance_transforms()});
   frame.stats.placed_patches = kept.size();
   frame.stats.layout = impl_->layout->stats();
   times.layout_ms = watch.lap_ms();
@@ -171,7 +172,7 @@ StatusOr<Frame> Session::render(const FrameInput& input) {
 
   TESSERA_RETURN_IF_ERROR(impl_->encode(input, delta, frame));
   times.encode_ms = watch.lap_ms();
-  const atlas::blocks::LayoutStats& layout = frame.stats.layout;
+  const atlas::LayoutStats& layout = frame.stats.layout;
   spdlog::debug(
       "frame {}: {} views, {} patches seen, {} blocks + {} colours ({} for want of memory), bias {:.2f}, "
       "{:.0f} % of the "

@@ -10,16 +10,19 @@ struct Item {
 };
 
 uint32_t shape_of(const atlas::Placement& p, uint32_t triangle_count) {
-  uint32_t shape = triangle_count << 8;
-  if (p.kind == atlas::PlacementKind::color) return shape | kBlockColor;
-  shape |= p.level.log_w | uint32_t{p.level.log_h} << 4;
-  if (p.transposed) shape |= kBlockTransposed;
-  if (p.masked) shape |= kBlockMasked;
-  return shape;
+  if (p.kind == atlas::PlacementKind::color) return triangle_count | kBlockColor;
+  return triangle_count | (p.transposed ? kBlockTransposed : 0) | (p.masked ? kBlockMasked : 0);
 }
 
-uint64_t texels(const atlas::Placement& p) {
-  return p.kind == atlas::PlacementKind::color ? 1 : uint64_t{p.width()} * p.height();
+uint32_t size_of(const atlas::Placement& p) {
+  return p.kind == atlas::PlacementKind::color ? 1u | 1u << 16 : p.width | uint32_t{p.height} << 16;
+}
+
+uint32_t spacing_of(const atlas::Placement& p) {
+  uint32_t codes = 0;
+  for (size_t i = 0; i < p.spacing.size(); ++i)
+    codes |= uint32_t{static_cast<uint8_t>(p.spacing[i])} << (8 * i);
+  return codes;
 }
 
 Status check(const atlas::Placement& p, uint32_t patch_count, const GatherLimits& limits) {
@@ -27,11 +30,10 @@ Status check(const atlas::Placement& p, uint32_t patch_count, const GatherLimits
     return absl::InvalidArgumentError(
         absl::StrFormat("gather: placement of patch %u, the scene has %u", p.patch, patch_count));
   if (p.kind == atlas::PlacementKind::color) return absl::OkStatus();
-  if (p.level.log_w > 15 || p.level.log_h > 15 || p.x + p.width() > limits.width ||
-      p.y + p.height() > limits.height)
+  if (p.width == 0 || p.height == 0 || p.x + p.width > limits.width || p.y + p.height > limits.height)
     return absl::InvalidArgumentError(
-        absl::StrFormat("gather: block of 2^%u x 2^%u texels at (%u, %u) leaves the %ux%u atlas",
-                        p.level.log_w, p.level.log_h, p.x, p.y, limits.width, limits.height));
+        absl::StrFormat("gather: block of %ux%u texels at (%u, %u) is empty or leaves the %ux%u atlas",
+                        p.width, p.height, p.x, p.y, limits.width, limits.height));
   return absl::OkStatus();
 }
 
@@ -65,7 +67,7 @@ std::vector<uint32_t> order_by_material(std::span<const Item> items, size_t mate
 }
 
 uint64_t item_samples(const BlockRecord& r) {
-  return uint64_t{1} << ((r.shape & 15) + ((r.shape >> 4) & 15));
+  return uint64_t{r.size & 0xffff} * (r.size >> 16);
 }
 
 // Appends compute blocks and the start of every chunk; each material's samples fill whole chunks.
@@ -129,9 +131,11 @@ StatusOr<GatherWork> build_gather_work(const scene::GpuScene& gpu_scene,
         {.record = {.instance = instance,
                     .first_triangle = gpu_scene.first_index(owner.geometry) / 3 + patch.first_triangle,
                     .place = color ? work.colors++ : p.x | uint32_t{p.y} << 16,
-                    .shape = shape_of(p, patch.triangle_count)},
+                    .size = size_of(p),
+                    .shape = shape_of(p, patch.triangle_count),
+                    .spacing = spacing_of(p)},
          .material = owner.material,
-         .raster = !color && texels(p) >= limits.raster_from_texels});
+         .raster = !color && p.texels() >= limits.raster_from_texels});
   }
   const std::vector<uint32_t> order = order_by_material(items, scene.materials.size());
   add_compute(work, items, order);

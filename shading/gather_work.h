@@ -16,11 +16,13 @@ struct BlockRecord {
   uint32_t instance;
   uint32_t first_triangle;  // of the patch, in GpuScene::indices() / 3
   uint32_t place;           // x | y << 16 in texels; or the slot of a single colour
-  uint32_t shape;           // log_w | log_h << 4 | triangle count << 8 | flags
+  uint32_t size;            // width | height << 16 in texels; 1 x 1 for a single colour
+  uint32_t shape;           // triangle count | flags
+  uint32_t spacing;         // codes of corners 1..4, least significant byte first (atlas::Placement)
   uint32_t first_sample;    // compute path
 };
-static_assert(sizeof(BlockRecord) == 20);
-constexpr uint32_t kBlockTransposed = 1u << 10, kBlockMasked = 1u << 11, kBlockColor = 1u << 12;
+static_assert(sizeof(BlockRecord) == 28);
+constexpr uint32_t kBlockTransposed = 1u << 2, kBlockMasked = 1u << 3, kBlockColor = 1u << 4;
 
 constexpr uint32_t kChunkSamples = 64;  // local size of gather.comp
 

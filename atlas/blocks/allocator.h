@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "atlas/placement.h"
+#include "atlas/level_selection.h"
 
 namespace tessera::atlas::blocks {
 

@@ -1,7 +1,7 @@
 #include "atlas/blocks/layout.h"
 
 #include <algorithm>
-#include <cassert>
+#include <bit>
 
 #include "atlas/blocks/allocator.h"
 #include "atlas/blocks/staged_reset.h"
@@ -13,9 +13,7 @@ constexpr uint32_t kMaxSide = 8192;  // texels
 constexpr uint64_t kStages = 8;      // a stage moves at most this part of the atlas
 constexpr int kPauseFrames = 15;     // between two resets; longer while resets do not help
 constexpr int kLongestPauseFrames = 240;
-constexpr float kRelief = 0.9f;         // of the high-water mark: a reset may end early below it
-constexpr float kBiasSlack = 0.25f;     // the bias may be this much larger than needed
-constexpr float kBiasStep = 1.0f / 16;  // and falls this much a frame beyond
+constexpr float kRelief = 0.9f;  // of the high-water mark: a reset may end early below it
 
 Status check(const LayoutSettings& s) {
   if (s.superblock_log < kMinLog || s.superblock_log > 8) {
@@ -37,32 +35,12 @@ Status check(const LayoutSettings& s) {
   return absl::OkStatus();
 }
 
-// One byte a patch of the whole scene.
-class TraitTable {
- public:
-  explicit TraitTable(const scene::Scene& scene) : bits_(scene.patch_count) {
-    for (const scene::Instance& instance : scene.instances) {
-      const bool masked = instance.material < scene.materials.size() &&
-                          scene.materials[instance.material].alpha_mode == scene::AlphaMode::mask;
-      uint8_t* bits = bits_.data() + instance.first_patch;
-      for (const scene::Patch& patch : scene.geometries[instance.geometry].patches) {
-        *bits++ = static_cast<uint8_t>(patch.triangle_count | (masked ? kMasked : 0));
-      }
-    }
-  }
-  PatchTraits operator[](scene::PatchId patch) const {
-    assert(patch < bits_.size());
-    const uint8_t bits = bits_[patch];
-    return {static_cast<uint8_t>(bits & ~kMasked), (bits & kMasked) != 0};
-  }
+uint64_t texel_count(Level level) {
+  return uint64_t{1} << (level.log_w + level.log_h);
+}
 
- private:
-  static constexpr uint8_t kMasked = 0x80;
-  std::vector<uint8_t> bits_;
-};
-
-uint32_t texel_count(Level level) {
-  return 1u << (level.log_w + level.log_h);
+Level level_of(const Placement& p) {
+  return {static_cast<uint8_t>(std::countr_zero(p.width)), static_cast<uint8_t>(std::countr_zero(p.height))};
 }
 
 // A patch's place and whether it went without one for want of memory.
@@ -75,19 +53,6 @@ struct Places {
     starved.clear();
   }
 };
-
-LayoutDelta difference(std::span<const Placement> before, std::span<const Placement> after) {
-  LayoutDelta delta;
-  auto old = before.begin();
-  for (const Placement& placement : after) {
-    for (; old != before.end() && old->patch < placement.patch; ++old) delta.removed.push_back(old->patch);
-    const bool known = old != before.end() && old->patch == placement.patch;
-    if (!known || *old != placement) delta.changed.push_back(placement);
-    if (known) ++old;
-  }
-  for (; old != before.end(); ++old) delta.removed.push_back(old->patch);
-  return delta;
-}
 
 }  // namespace
 
@@ -130,14 +95,14 @@ struct Layout::Impl {
   }
 
   LayoutSettings settings;
-  TraitTable traits;
+  PatchTraitTable traits;
   uint32_t superblocks;
   Allocator allocator;
   StagedReset reset;
   AdaptiveTarget target;
+  BiasFollower bias;
   LayoutStats stats;
 
-  bool has_bias = false;
   bool memory_short = false;  // after the last frame: blocks may not grow
   int pause_frames = kPauseFrames, frames_since_reset = kPauseFrames;
 
@@ -154,20 +119,20 @@ BlockAddress Layout::Impl::address(const Placement& p) const {
   const uint8_t log = settings.superblock_log;
   const uint32_t mask = (1u << log) - 1;
   const uint32_t superblock = (p.y >> log) * (settings.width >> log) + (p.x >> log);
-  return {superblock, Allocator::index_in_superblock({p.x & mask, p.y & mask}, p.level, log)};
+  return {superblock, Allocator::index_in_superblock({p.x & mask, p.y & mask}, level_of(p), log)};
 }
 
 void Layout::Impl::place(Placement& placement, const BlockAddress& block) const {
   const uint8_t log = settings.superblock_log;
   const uint32_t superblocks_across = settings.width >> log;
-  const uvec2 offset = Allocator::offset_in_superblock(block, placement.level, log);
+  const uvec2 offset = Allocator::offset_in_superblock(block, level_of(placement), log);
   placement.x = static_cast<uint16_t>((block.superblock % superblocks_across << log) + offset.x);
   placement.y = static_cast<uint16_t>((block.superblock / superblocks_across << log) + offset.y);
 }
 
 void Layout::Impl::free_block(const Placement& placement) {
   if (placement.kind != PlacementKind::block) return;
-  frees.push_back({.frees = true, .old_level = placement.level, .old_block = address(placement)});
+  frees.push_back({.frees = true, .old_level = level_of(placement), .old_block = address(placement)});
 }
 
 LayoutDelta Layout::Impl::update(const scene::VisiblePatches& visible) {
@@ -184,7 +149,6 @@ LayoutDelta Layout::Impl::update(const scene::VisiblePatches& visible) {
   return delta;
 }
 
-// The bias stays between what is needed and a little more, so that a camera that sways does not move it.
 void Layout::Impl::follow_bias(const scene::VisiblePatches& visible) {
   ideal_areas.clear();
   needs.clear();
@@ -192,13 +156,7 @@ void Layout::Impl::follow_bias(const scene::VisiblePatches& visible) {
     needs.push_back(block_need(v.footprint, traits[v.patch]));
     ideal_areas.push_back(needs.back().area);
   }
-  const float needed = select_bias(ideal_areas, target.texels(), settings.levels);
-  if (!has_bias || needed > stats.bias) {
-    stats.bias = needed;
-  } else if (needed + kBiasSlack < stats.bias) {
-    stats.bias = std::max(needed + kBiasSlack, stats.bias - kBiasStep);
-  }
-  has_bias = true;
+  stats.bias = bias.follow(select_bias(ideal_areas, target.texels(), settings.levels));
   stats.ideal_texels = 0;
   for (const float area : ideal_areas) stats.ideal_texels += area;
 }
@@ -230,7 +188,8 @@ void Layout::Impl::choose_level(scene::PatchId patch, const BlockNeed& need, siz
   const bool moves = had_block && must_move(was);
   // A patch that is placed anew anyway takes the level that fits it best.
   const bool anchored = known && !moves && !before.starved[old];
-  const LevelWish previous{was.kind == PlacementKind::color, was.level, was.transposed};
+  const bool was_color = was.kind == PlacementKind::color;
+  const LevelWish previous{was_color, was_color ? Level{} : level_of(was), was.transposed};
   const bool masked = traits[patch].masked;
   const LevelWish wish =
       select_level(need, masked, stats.bias, anchored ? &previous : nullptr, settings.levels);
@@ -238,17 +197,18 @@ void Layout::Impl::choose_level(scene::PatchId patch, const BlockNeed& need, siz
   const auto index = static_cast<uint32_t>(now.placements.size());
   Placement& placement = now.placements.emplace_back(Placement{.patch = patch, .masked = masked});
   now.starved.push_back(0);
-  const bool waits = had_block && !moves && memory_short && !wish.single_color &&
-                     texel_count(wish.level) > texel_count(was.level);
+  const bool waits =
+      had_block && !moves && memory_short && !wish.single_color && texel_count(wish.level) > was.texels();
   if (waits) {
     placement = was;
   } else if (wish.single_color) {
     if (had_block) free_block(was);
   } else {
     placement.kind = PlacementKind::block;
-    placement.level = wish.level;
+    placement.width = static_cast<uint16_t>(1u << wish.level.log_w);
+    placement.height = static_cast<uint16_t>(1u << wish.level.log_h);
     placement.transposed = wish.transposed;
-    if (had_block && !moves && wish.level == was.level) {
+    if (had_block && !moves && wish.level == level_of(was)) {
       placement.x = was.x;
       placement.y = was.y;
     } else {
@@ -266,7 +226,7 @@ void Layout::Impl::allocate() {
   // Who had a block comes first: losing it would show more than not getting one.
   moving.insert(moving.end(), entering.begin(), entering.end());
   for (const uint32_t index : moving) {
-    allocations.push_back({.allocates = true, .level = now.placements[index].level});
+    allocations.push_back({.allocates = true, .level = level_of(now.placements[index])});
   }
   blocks.resize(allocations.size());
   allocator.update(allocations, blocks);
@@ -329,17 +289,14 @@ StatusOr<std::unique_ptr<Layout>> Layout::create(const scene::Scene& scene, cons
 
 Layout::Layout(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Layout::~Layout() = default;
-LayoutDelta Layout::update(const scene::VisiblePatches& visible) {
-  return impl_->update(visible);
+LayoutDelta Layout::update(const LayoutInput& input) {
+  return impl_->update(input.visible);
 }
 std::span<const Placement> Layout::placements() const {
   return impl_->now.placements;
 }
 const LayoutStats& Layout::stats() const {
   return impl_->stats;
-}
-const LayoutSettings& Layout::settings() const {
-  return impl_->settings;
 }
 
 }  // namespace tessera::atlas::blocks

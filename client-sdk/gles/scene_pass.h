@@ -31,7 +31,7 @@ class ScenePass {
 
  private:
   static TableTexture record_table() {
-    return TableTexture({GL_RGBA32UI, GL_RGBA_INTEGER, GL_UNSIGNED_INT, sizeof(TriangleRecord)});
+    return TableTexture({GL_RGBA32UI, GL_RGBA_INTEGER, GL_UNSIGNED_INT, sizeof(TriangleRecord) / 2});
   }
 
   ScenePass() = default;

@@ -3,8 +3,8 @@
 
 namespace tessera::client::gles {
 
-// Reads: a triangle record (scene_state.h), vertex positions, and three texels an object: the rows of mesh
-// space to metres relative to the eye. Writes: the corner's texel in the atlas, and what the whole triangle
+// Reads: the two texels of a triangle record (scene_state.h), vertex positions, and three texels an object: the rows of
+// mesh space to metres relative to the eye. Writes: the corner's texel in the atlas, and what the whole triangle
 // shares.
 constexpr const char* kSceneVertex = R"(#version 300 es
 precision highp float;
@@ -14,8 +14,9 @@ uniform highp sampler2D vertices;
 uniform highp sampler2D transforms;
 uniform mat4 clip_from_relative;
 
-out vec2 texel;
-flat out vec4 texel_bounds;     // centres of the first and last texel of the block's colour part
+out vec3 spaced;                // texel within the block, and 1, times the corner's distance from the block's eye
+flat out vec2 origin;           // of the block, in texels
+flat out vec2 last;             // centre of the last texel of the block's colour part, from the origin; of the first: 0.5
 flat out vec2 coverage_offset;  // from a texel to its coverage
 flat out vec4 single_color;     // a = 1: no block
 
@@ -30,42 +31,49 @@ const vec2 kCorners[18] = vec2[18](
 
 ivec2 table_texel(int i) { return ivec2(i & 2047, i >> 11); }
 
-void set_block(uvec4 record, int corner) {
-  ivec2 origin = 2 * ivec2(int(record.w & 0xfffu), int(record.w >> 12 & 0xfffu));
-  ivec2 size = ivec2(2 << int(record.w >> 24 & 7u), 2 << int(record.w >> 27 & 7u));
-  bool masked = (record.x >> 26 & 1u) != 0u;
+void set_block(uvec4 shape, uint what, int corner) {
+  origin = vec2(uvec2(shape.x, shape.x >> 16) & 0xffffu);
+  ivec2 size = ivec2(uvec2(shape.y, shape.y >> 16) & 0xffffu);
+  bool masked = (what >> 28 & 1u) != 0u;
   ivec2 to_coverage = ivec2(0);
   if (masked) {  // coverage lies beside the colour, or below it
     to_coverage = size.x > size.y ? ivec2(size.x / 2, 0) : ivec2(0, size.y / 2);
     size -= to_coverage;
   }
-  vec2 position = kCorners[3 * int(record.x >> 22 & 7u) + corner];
-  if ((record.x >> 25 & 1u) != 0u) position = position.yx;
-  vec2 last = vec2(size - 1);
+  vec2 position = kCorners[3 * int(what >> 24 & 7u) + corner];
+  if ((what >> 27 & 1u) != 0u) position = position.yx;
+  last = vec2(size) - 0.5;
   // Half-texel inset; corners lie at texel centres, rounded (atlas/placement.h).
-  texel = vec2(origin) + floor(position * last + 0.5) + 0.5;
-  texel_bounds = vec4(vec2(origin) + 0.5, vec2(origin) + last + 0.5);
+  vec2 texel = floor(position * vec2(size - 1) + 0.5) + 0.5;
+  // Interpolated on the surface, then divided: even on the screen of that eye (TSS eq. 5).
+  float distance = exp2(float(int(shape.z << (24 - 8 * corner)) >> 24) * (6.0 / 127.0));
+  spaced = distance * vec3(texel, 1.0);
   coverage_offset = vec2(to_coverage);
 }
 
 void main() {
-  uvec4 record = texelFetch(records, table_texel(gl_VertexID / 3), 0);
+  int first_texel = 2 * (gl_VertexID / 3);
+  uvec4 corners = texelFetch(records, table_texel(first_texel), 0);
+  uvec4 shape = texelFetch(records, table_texel(first_texel + 1), 0);
+  uint what = corners.w;
   int corner = gl_VertexID % 3;
-  if ((record.x >> 27 & 1u) != 0u) corner = (3 - corner) % 3;  // mirrored objects: the other way round
+  if ((what >> 29 & 1u) != 0u) corner = (3 - corner) % 3;  // mirrored objects: the other way round
 
-  uint vertex = (corner == 0 ? record.x : corner == 1 ? record.y : record.z) & 0x3fffffu;
-  int object = int(record.y >> 22 | record.z >> 22 << 10);
+  uint vertex = corner == 0 ? corners.x : corner == 1 ? corners.y : corners.z;
+  int object = int(what & 0xffffffu);
   vec4 position = vec4(texelFetch(vertices, table_texel(int(vertex)), 0).xyz, 1.0);
   vec3 relative = vec3(dot(texelFetch(transforms, table_texel(3 * object), 0), position),
                        dot(texelFetch(transforms, table_texel(3 * object + 1), 0), position),
                        dot(texelFetch(transforms, table_texel(3 * object + 2), 0), position));
   gl_Position = clip_from_relative * vec4(relative, 1.0);
 
-  texel = vec2(0.5);
-  texel_bounds = vec4(0.5);
+  spaced = vec3(0.5, 0.5, 1.0);
+  origin = vec2(0.0);
+  last = vec2(0.5);
   coverage_offset = vec2(0.0);
-  single_color = vec4(vec3(uvec3(record.w, record.w >> 8, record.w >> 16) & 0xffu) / 255.0, float(record.w >> 31));
-  if (record.w >> 31 == 0u) set_block(record, corner);
+  bool is_single = (what >> 30 & 1u) != 0u;
+  single_color = vec4(vec3(uvec3(shape.x, shape.x >> 8, shape.x >> 16) & 0xffu) / 255.0, is_single ? 1.0 : 0.0);
+  if (!is_single) set_block(shape, what, corner);
 }
 )";
 
@@ -76,8 +84,9 @@ uniform vec2 atlas_size;
 uniform bool masked;
 uniform bool multisampled;
 
-in vec2 texel;
-flat in vec4 texel_bounds;
+in vec3 spaced;
+flat in vec2 origin;
+flat in vec2 last;
 flat in vec2 coverage_offset;
 flat in vec4 single_color;
 out vec4 color;
@@ -87,7 +96,8 @@ vec3 atlas_at(vec2 position) { return textureLod(atlas, position / atlas_size, 0
 void main() {
   // At a pixel whose centre lies outside the triangle interpolation may leave the block. Not `centroid`: thin triangles
   // share most of their pixels, and each would be sampled elsewhere than where the pixel shows it.
-  vec2 inside = clamp(texel, texel_bounds.xy, texel_bounds.zw);
+  // There the divisor may even vanish.
+  vec2 inside = origin + clamp(spaced.xy / max(spaced.z, 1e-6), vec2(0.5), last);
   color = vec4(for_target(single_color.a > 0.5 ? single_color.rgb : atlas_at(inside)), 1.0);
   if (!masked) return;
   // Coverage travels as grey, 0.5 = the material's cut-off. Its luma is free of chroma's rounding.

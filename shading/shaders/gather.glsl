@@ -8,10 +8,12 @@ struct Block {
   uint instance;
   uint first_triangle;  // of the patch, in the index buffer / 3
   uint place;           // x | y << 16 in texels; or the slot of a single colour
-  uint shape;           // log_w | log_h << 4 | triangle count << 8 | flags
+  uint size;            // width | height << 16 in texels; 1 x 1 for a single colour
+  uint shape;           // triangle count | flags
+  uint spacing;         // codes of corners 1..4
   uint first_sample;    // compute path: of the whole dispatch
 };
-const uint kBlockTransposed = 1u << 10, kBlockMasked = 1u << 11, kBlockColor = 1u << 12;
+const uint kBlockTransposed = 1u << 2, kBlockMasked = 1u << 3, kBlockColor = 1u << 4;
 
 layout(set = 3, binding = 1, std430) readonly buffer Blocks { Block blocks[]; };
 
@@ -23,7 +25,7 @@ layout(push_constant) uniform Pass {
   uint first_chunk, end_chunk;  // compute path
 } pass;
 
-uvec2 block_size(uint shape) { return uvec2(1u << (shape & 15u), 1u << ((shape >> 4) & 15u)); }
+uvec2 block_size(Block block) { return uvec2(block.size & 0xffffu, block.size >> 16); }
 
 // The block's corners of a triangle (scene::patch_corner).
 struct Corners {
@@ -69,6 +71,28 @@ TrianglePoint block_point(uint count, vec2 at, vec2 extent, out uint triangle) {
   return p;
 }
 
+// Distance of the eye that the block was placed for, of each corner of a triangle, up to a factor.
+vec3 corner_distances(uint spacing, uint count, uint triangle) {
+  // Corner of the patch, by corner of the triangle (scene::Patch).
+  uvec3 corner = uvec3(0, 1, 2);
+  if (triangle > 0u) corner = count == 2u ? uvec3(3, 2, 1) : triangle == 1u ? uvec3(3, 0, 2) : uvec3(1, 4, 2);
+  vec3 code;
+  for (int i = 0; i < 3; ++i)
+    code[i] = corner[i] == 0u ? 0.0 : float(bitfieldExtract(int(spacing), int(8u * (corner[i] - 1u)), 8));
+  return exp2(code * (6.0 / 127.0));
+}
+
+// From a place that is even on that eye's screen to the surface (TSS eq. 5): weights go by 1 / distance.
+void space_point(vec3 distances, inout TrianglePoint at) {
+  vec3 inverse = 1.0 / distances;
+  vec2 slope = inverse.yz - inverse.x;
+  float sum = inverse.x + dot(at.weights, slope);
+  vec2 scaled = at.weights * inverse.yz;
+  at.weights = scaled / sum;
+  at.ddx = (at.ddx * inverse.yz - at.weights * dot(at.ddx, slope)) / sum;
+  at.ddy = (at.ddy * inverse.yz - at.weights * dot(at.ddy, slope)) / sum;
+}
+
 // How the weights change over a pixel of the viewer: a texel that is finer than the pixel must not carry more detail than
 // the pixel can show, or the client, which has no mip-maps, would alias. Same derivation as triangle_point() in view.glsl.
 void see_point(Triangle t, inout TrianglePoint at) {
@@ -93,7 +117,7 @@ float coverage(float alpha, float cutoff) { return clamp(0.5 + 2.0 * (alpha - cu
 // Display-linear colour of one texel of a block; `texel` counts from its upper left corner. A single colour is the
 // block's centre, filtered over the patch.
 vec3 block_texel(Block block, uvec2 texel) {
-  uvec2 size = block_size(block.shape);
+  uvec2 size = block_size(block);
   bool is_coverage = false;
   if ((block.shape & kBlockMasked) != 0u) {
     if (size.x > size.y) {
@@ -106,7 +130,7 @@ vec3 block_texel(Block block, uvec2 texel) {
       texel.y -= is_coverage ? size.y : 0u;
     }
   }
-  uint count = (block.shape >> 8) & 3u;
+  uint count = block.shape & 3u;
   vec2 at = vec2(texel), extent = vec2(size) - 1.0;
   // A side of one texel stands for the middle of its axis.
   if (extent.x < 0.5) { extent.x = 1.0; at.x = 0.5; }
@@ -124,6 +148,7 @@ vec3 block_texel(Block block, uvec2 texel) {
   }
   uint triangle;
   TrianglePoint point = block_point(count, at, extent, triangle);
+  if (block.spacing != 0u) space_point(corner_distances(block.spacing, count, triangle), point);
   point.ddx *= footprint;
   point.ddy *= footprint;
   Stand stand = load_stand(block.instance);

@@ -72,7 +72,8 @@ class Model {
       const uvec2 offset = Allocator::offset_in_superblock(owner.block, owner.level, superblock_log_);
       ASSERT_EQ(Allocator::index_in_superblock(offset, owner.level, superblock_log_), owner.block.index);
       ASSERT_LE(offset.y + (1u << owner.level.log_h), side);
-      ASSERT_TRUE(occupancy.take(offset.x, owner.block.superblock * side + offset.y, owner.level));
+      ASSERT_TRUE(occupancy.take(offset.x, owner.block.superblock * side + offset.y, 1u << owner.level.log_w,
+                                 1u << owner.level.log_h));
     }
     const AllocatorStats s = allocator.stats();
     ASSERT_EQ(s.used_texels, occupancy.texels());

@@ -1,4 +1,5 @@
 #include "atlas/level_selection.h"
+#include "atlas/placement.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,6 +15,13 @@ using scene::Footprint;
 
 constexpr PatchTraits kLone{.triangle_count = 1}, kPair{.triangle_count = 2};
 constexpr PatchTraits kMaskedPair{.triangle_count = 2, .masked = true};
+
+Placement block(Level level, bool masked) {
+  return {.kind = PlacementKind::block,
+          .width = static_cast<uint16_t>(1u << level.log_w),
+          .height = static_cast<uint16_t>(1u << level.log_h),
+          .masked = masked};
+}
 
 Footprint rectangle(float u, float v) {
   return {u, v, u * v};
@@ -115,7 +123,7 @@ TEST(LevelSelection, MirroredFootprintsGetMirroredBlocks) {
         EXPECT_FALSE(wide.transposed);
         if (high.transposed) continue;
         // Equal sides of the colour part, or no block.
-        const Placement p{.kind = PlacementKind::block, .level = high.level, .masked = traits.masked};
+        const Placement p = block(high.level, traits.masked);
         EXPECT_TRUE(high.single_color || p.color_width() == p.color_height());
       }
     }
@@ -134,7 +142,7 @@ TEST(LevelSelection, MaskedPatchesKeepTheirColorResolution) {
       EXPECT_EQ(ideal_area(rectangle(u, v), kMaskedPair), 2 * ideal_area(rectangle(u, v), kPair));
       const LevelWish opaque = select_level(rectangle(u, v), kPair, 0, nullptr, {});
       const LevelWish masked = select_level(rectangle(u, v), kMaskedPair, 0, nullptr, {});
-      const Placement p{.kind = PlacementKind::block, .level = masked.level, .masked = true};
+      const Placement p = block(masked.level, true);
       EXPECT_EQ(p.color_width(), 1u << opaque.level.log_w);
       EXPECT_EQ(p.color_height(), 1u << opaque.level.log_h);
       EXPECT_EQ(masked.transposed, opaque.transposed);
@@ -149,7 +157,7 @@ TEST(LevelSelection, HalvesOfMaskedBlocksAreAtLeastTwoTexels) {
       for (float v = 0.1f; v < 4000; v *= 1.2f) {
         const LevelWish wish = select_level(rectangle(u, v), kMaskedPair, 0, nullptr, {.max_log = max_log});
         if (wish.single_color) continue;
-        const Placement p{.kind = PlacementKind::block, .level = wish.level, .masked = true};
+        const Placement p = block(wish.level, true);
         EXPECT_GE(p.color_width(), 2u);
         EXPECT_GE(p.color_height(), 2u);
       }

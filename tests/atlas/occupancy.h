@@ -16,8 +16,7 @@ class Occupancy {
       : width_(width), height_(height), taken_(size_t{width} * height) {}
 
   // False if the rectangle leaves the atlas or covers a texel that is taken.
-  [[nodiscard]] bool take(uint32_t x, uint32_t y, Level level) {
-    const uint32_t w = 1u << level.log_w, h = 1u << level.log_h;
+  [[nodiscard]] bool take(uint32_t x, uint32_t y, uint32_t w, uint32_t h) {
     if (x + w > width_ || y + h > height_) return false;
     for (uint32_t row = y; row < y + h; ++row) {
       for (uint32_t column = x; column < x + w; ++column) {

@@ -25,9 +25,10 @@ struct Fixture : testing::Test {
   std::vector<atlas::Placement> placements = {{.patch = 0, .kind = atlas::PlacementKind::color},
                                               {.patch = 1,
                                                .kind = atlas::PlacementKind::block,
-                                               .level = {4, 3},
                                                .x = 32,
                                                .y = 64,
+                                               .width = 16,
+                                               .height = 8,
                                                .transposed = true}};
   client::SceneState state = [] {
     client::SceneState s;
@@ -38,8 +39,8 @@ struct Fixture : testing::Test {
     block.corner_kind = 1;
     block.x = 32;
     block.y = 64;
-    block.log_w = 4;
-    block.log_h = 3;
+    block.width = 16;
+    block.height = 8;
     block.transposed = true;
     s.records[0] = {client::pack(block), client::pack(color)};
     block.corner_kind = 2;
@@ -57,10 +58,10 @@ TEST_F(Fixture, EveryDifferenceIsSeen) {
     std::vector<atlas::Placement> other = placements;
     if (what == 0) other[1].x += 2;
     if (what == 1) other[1].y += 2;
-    if (what == 2) other[1].level.log_w = 5;
+    if (what == 2) other[1].width = 32;
     if (what == 3) other[1].transposed = false;
     if (what == 4) other.pop_back();
-    if (what == 5) other[0] = {.patch = 0, .kind = atlas::PlacementKind::block, .level = {1, 1}};
+    if (what == 5) other[0] = {.patch = 0, .kind = atlas::PlacementKind::block, .width = 2, .height = 2};
     EXPECT_FALSE(matches(state, other, scene)) << what;
   }
 }

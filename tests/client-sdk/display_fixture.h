@@ -116,8 +116,8 @@ class SceneBuilder {
                                 .kind = geometry_compression::PlacementKind::block,
                                 .x = static_cast<uint16_t>(x),
                                 .y = static_cast<uint16_t>(y),
-                                .log_w = static_cast<uint8_t>(log_w),
-                                .log_h = static_cast<uint8_t>(log_h),
+                                .width = static_cast<uint16_t>(1u << log_w),
+                                .height = static_cast<uint16_t>(1u << log_h),
                                 .transposed = transposed});
   }
 

@@ -42,8 +42,8 @@ inline PatchPlacement in_color(uint32_t patch, uint32_t rgb) {
   return {.patch = patch, .kind = PlacementKind::color, .rgb = rgb};
 }
 
-inline PatchPlacement in_block(uint32_t patch, uint16_t x, uint16_t y, uint8_t log_w, uint8_t log_h) {
-  return {.patch = patch, .kind = PlacementKind::block, .x = x, .y = y, .log_w = log_w, .log_h = log_h};
+inline PatchPlacement in_block(uint32_t patch, uint16_t x, uint16_t y, uint16_t width, uint16_t height) {
+  return {.patch = patch, .kind = PlacementKind::block, .x = x, .y = y, .width = width, .height = height};
 }
 
 inline PatchPlacement gone(uint32_t patch) {

@@ -21,7 +21,7 @@ TEST(MetaChecker, AcceptsFramesThatBuildOnEachOther) {
   MetaFrame second = next_frame(0);  // wrapped around
   second.vertices.push_back({0, {1, 1, 1}});
   second.patches.push_back({.object = 0, .triangles = 1, .vertices = {0, 1, 5}});
-  second.placements.push_back(in_block(1, 8, 8, 3, 3));
+  second.placements.push_back(in_block(1, 8, 8, 8, 8));
   second.moved.push_back({});
   EXPECT_TRUE(checker.check(second).ok());
 }
@@ -118,12 +118,18 @@ const HostileCase kHostile[] = {
     {"placements.rgb", [](MetaFrame& f) { f.placements.push_back(in_color(0, 0x1000000)); }},
     {"placements.kind",
      [](MetaFrame& f) { f.placements.push_back({.kind = static_cast<PlacementKind>(3)}); }},
-    {"placements.log_w", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 0, 0, 1)); }},
-    {"placements.log_w", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 0, 1, 9)); }},
-    {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 1, 0, 1, 1)); }},
-    {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 16, 0, 1, 1)); }},
-    {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 14, 2, 2)); }},
-    {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 65534, 1, 1)); }},
+    {"placements.width", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 0, 0, 2)); }},
+    {"placements.width", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 0, 3, 2)); }},
+    {"placements.width", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 0, 2, 258)); }},
+    {"placements.spacing",
+     [](MetaFrame& f) {
+       f.placements.push_back(in_block(0, 0, 0, 2, 2));
+       f.placements.back().spacing[3] = 127;
+     }},
+    {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 1, 0, 2, 2)); }},
+    {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 16, 0, 2, 2)); }},
+    {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 14, 4, 4)); }},
+    {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 65534, 2, 2)); }},
 };
 INSTANTIATE_TEST_SUITE_P(MetaChecker, Hostile, ::testing::ValuesIn(kHostile));
 

@@ -7,14 +7,14 @@
 namespace tessera::client {
 namespace {
 
-TEST(TriangleRecord, EveryBlockPositionAndSizeSurvivesPacking) {
+TEST(TriangleRecord, EveryBlockPositionSizeAndSpacingSurvivesPacking) {
   for (uint32_t i = 0; i < 8192; i += 2) {
-    for (uint8_t log = 1; log <= 8; ++log) {
-      TriangleFields f{.x = static_cast<uint16_t>(i), .y = static_cast<uint16_t>(8190 - i)};
-      f.log_w = log;
-      f.log_h = static_cast<uint8_t>(9 - log);
-      ASSERT_EQ(unpack(pack(f)), f) << i << " " << int{log};
-    }
+    TriangleFields f{.x = static_cast<uint16_t>(i), .y = static_cast<uint16_t>(8190 - i)};
+    f.width = static_cast<uint16_t>(2 + i % 256);
+    f.height = static_cast<uint16_t>(256 - i % 256);
+    const auto code = static_cast<int8_t>(static_cast<int>(i / 2 % 255) - 127);
+    f.spacing = {code, static_cast<int8_t>(-code), static_cast<int8_t>(code / 2)};
+    ASSERT_EQ(unpack(pack(f)), f) << i;
   }
 }
 
@@ -22,8 +22,8 @@ TEST(TriangleRecord, FieldsDoNotDisturbEachOther) {
   std::mt19937 random(1);
   for (int i = 0; i < 20000; ++i) {
     TriangleFields f;
-    for (auto& vertex : f.vertices) vertex = random() >> (random() % 2 ? 10 : 31);
-    f.object = random() >> 12;
+    for (auto& vertex : f.vertices) vertex = random() >> (random() % 2 ? 0 : 31);
+    f.object = random() >> 8;
     f.corner_kind = static_cast<uint8_t>(random() % 6);
     f.transposed = random() & 1;
     f.masked = random() & 1;
@@ -34,8 +34,9 @@ TEST(TriangleRecord, FieldsDoNotDisturbEachOther) {
     } else {
       f.x = static_cast<uint16_t>(random() % 4096 * 2);
       f.y = static_cast<uint16_t>(random() % 4096 * 2);
-      f.log_w = static_cast<uint8_t>(1 + random() % 8);
-      f.log_h = static_cast<uint8_t>(1 + random() % 8);
+      f.width = static_cast<uint16_t>(random());
+      f.height = static_cast<uint16_t>(random());
+      for (int8_t& code : f.spacing) code = static_cast<int8_t>(random());
     }
     ASSERT_EQ(unpack(pack(f)), f);
   }
@@ -44,20 +45,22 @@ TEST(TriangleRecord, FieldsDoNotDisturbEachOther) {
 // The layout is shared with shaders, so the bits themselves are pinned.
 TEST(TriangleRecord, BitsAreWhereTheHeaderSays) {
   const TriangleRecord block = pack({.vertices = {1, 2, 3},
-                                     .object = (5u << 10) | 9,
+                                     .object = 9,
                                      .corner_kind = 4,
                                      .transposed = true,
                                      .masked = true,
                                      .reversed = true,
                                      .x = 10,
                                      .y = 20,
-                                     .log_w = 3,
-                                     .log_h = 2});
-  EXPECT_EQ(block.a, 1u | 4u << 22 | 1u << 25 | 1u << 26 | 1u << 27);
-  EXPECT_EQ(block.b, 2u | 9u << 22);
-  EXPECT_EQ(block.c, 3u | 5u << 22);
-  EXPECT_EQ(block.d, 5u | 10u << 12 | 2u << 24 | 1u << 27);
-  EXPECT_EQ(pack({.single_color = true, .rgb = 0x123456}).d, 0x80123456u);
+                                     .width = 8,
+                                     .height = 4,
+                                     .spacing = {0, -1, 5}});
+  EXPECT_EQ(block.vertices,
+            (std::array<uint32_t, 4>{1, 2, 3, 9u | 4u << 24 | 1u << 27 | 1u << 28 | 1u << 29}));
+  EXPECT_EQ(block.shape, (std::array<uint32_t, 4>{10u | 20u << 16, 8u | 4u << 16, 0x05ff00u, 0u}));
+  const TriangleRecord color = pack({.single_color = true, .rgb = 0x123456});
+  EXPECT_EQ(color.vertices[3], 1u << 30);
+  EXPECT_EQ(color.shape[0], 0x123456u);
 }
 
 }  // namespace

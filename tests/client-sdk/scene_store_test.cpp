@@ -38,7 +38,7 @@ TEST(SceneStore, TrianglesOfEachPatchSize) {
   for (uint8_t triangles = 1; triangles <= 3; ++triangles) {
     SceneStore store;
     MetaFrame frame = first_frame(1, 1, triangles);
-    frame.placements.push_back(in_block(0, 4, 8, 3, 2));
+    frame.placements.push_back(in_block(0, 4, 8, 8, 4));
     store.apply(frame);
     const auto& records = group(store.state(), RecordGroup::single_sided);
     ASSERT_EQ(records.size(), triangles);
@@ -48,8 +48,8 @@ TEST(SceneStore, TrianglesOfEachPatchSize) {
       EXPECT_EQ(fields.corner_kind, first_kind[triangles - 1] + t);
       EXPECT_EQ(fields.x, 4);
       EXPECT_EQ(fields.y, 8);
-      EXPECT_EQ(fields.log_w, 3);
-      EXPECT_EQ(fields.log_h, 2);
+      EXPECT_EQ(fields.width, 8);
+      EXPECT_EQ(fields.height, 4);
     }
   }
 }
@@ -130,8 +130,8 @@ PatchPlacement random_placement(uint32_t patch, std::mt19937& random) {
     case 1:
       return in_color(patch, patch * 7919u & 0xffffffu);
     default:
-      return in_block(patch, static_cast<uint16_t>(patch % 64 * 2), static_cast<uint16_t>(patch / 64 * 2), 1,
-                      1);
+      return in_block(patch, static_cast<uint16_t>(patch % 64 * 2), static_cast<uint16_t>(patch / 64 * 2), 2,
+                      2);
   }
 }
 

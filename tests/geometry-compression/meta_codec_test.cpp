@@ -56,9 +56,9 @@ TEST(MetaCodec, ExtremesOfEveryField) {
     for (int i = 0; i < triangles + 2; ++i) p.vertices[i] = i % 2 ? UINT32_MAX : 0;
     f.patches.push_back(p);
   }
-  f.placements = {{0, PlacementKind::block, 8190, 8190, 8, 1, true, 0},
-                  {1, PlacementKind::block, 0, 0, 1, 8, false, 0},
-                  {UINT32_MAX - 1, PlacementKind::color, 0, 0, 0, 0, false, 0xffffff},
+  f.placements = {{0, PlacementKind::block, 8190, 8190, 256, 2, true, {126, -126, 126, -126}},
+                  {1, PlacementKind::block, 0, 0, 2, 254, false, {-126, -126, 126, 126}},
+                  {UINT32_MAX - 1, PlacementKind::color, 0, 0, 0, 0, false, {}, 0xffffff},
                   {UINT32_MAX, PlacementKind::none}};
   expect_round_trip(f);
 }
@@ -114,8 +114,8 @@ TEST(MetaCodec, TestVectorOfTheSpecification) {
   object.transform.translation = {0, 4, 0};
   f.objects = {object};
   f.patches = {{0, 2, {0, 1, 2, 3}}, {0, 1, {2, 3, 0}}};
-  f.placements = {{0, PlacementKind::block, 32, 16, 4, 3, false, 0},
-                  {1, PlacementKind::color, 0, 0, 0, 0, false, 0x0a141e}};
+  f.placements = {{0, PlacementKind::block, 32, 16, 16, 8, false},
+                  {1, PlacementKind::color, 0, 0, 0, 0, false, {}, 0x0a141e}};
   const auto bytes = encode(f);
   std::string hex;
   for (uint8_t b : bytes) {

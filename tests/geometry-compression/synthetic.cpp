@@ -41,9 +41,10 @@ PatchPlacement any_placement(Random& random) {
   if (p.kind == PlacementKind::block) {
     p.x = static_cast<uint16_t>(2 * below(random, 4096));
     p.y = static_cast<uint16_t>(2 * below(random, 4096));
-    p.log_w = static_cast<uint8_t>(1 + below(random, 8));
-    p.log_h = static_cast<uint8_t>(1 + below(random, 8));
+    p.width = static_cast<uint16_t>(2 + 2 * below(random, 128));
+    p.height = static_cast<uint16_t>(2 + 2 * below(random, 128));
     p.transposed = below(random, 2) != 0;
+    for (int8_t& code : p.spacing) code = static_cast<int8_t>(static_cast<int>(below(random, 253)) - 126);
   } else if (p.kind == PlacementKind::color) {
     p.rgb = static_cast<uint32_t>(random() & 0xffffff);
   }
@@ -120,8 +121,8 @@ class ColumnPacker {
     p.kind = PlacementKind::block;
     p.x = static_cast<uint16_t>(column.x);
     p.y = static_cast<uint16_t>(column.y % 2048);
-    p.log_w = log_w;
-    p.log_h = log_h;
+    p.width = static_cast<uint16_t>(1u << log_w);
+    p.height = static_cast<uint16_t>(1u << log_h);
     column.y += 1u << log_h;
     return p;
   }

@@ -60,7 +60,7 @@ gc::MetaFrame scene(const FakeRendererSettings& s, uint32_t width, uint32_t heig
     for (float& value : transform.linear) value = static_cast<float>(random()) * 0x1p-30f;
     meta.moved.push_back({object, transform});
   }
-  meta.placements = {{.kind = gc::PlacementKind::block, .x = block_x(number), .log_w = 1, .log_h = 1}};
+  meta.placements = {{.kind = gc::PlacementKind::block, .x = block_x(number), .width = 2, .height = 2}};
   return meta;
 }
 
@@ -111,7 +111,7 @@ RendererFactory fake_renders(const FakeRendererSettings& fake) {
 
 SessionSettings small_session() {
   SessionSettings s;
-  s.layout = atlas::blocks::settings_for(256, 128);
+  s.layout = atlas::layout_settings(atlas::LayoutKind::blocks, 256, 128);
   s.rate.bitrate_bps = 4e6;
   return s;
 }

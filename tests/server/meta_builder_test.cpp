@@ -36,7 +36,7 @@ scene::Scene make_scene() {
 }
 
 atlas::Placement block(scene::PatchId patch, uint16_t x) {
-  return {.patch = patch, .kind = atlas::PlacementKind::block, .level = {3, 2}, .x = x, .y = 8};
+  return {.patch = patch, .kind = atlas::PlacementKind::block, .x = x, .y = 8, .width = 8, .height = 4};
 }
 atlas::Placement color(scene::PatchId patch) {
   return {.patch = patch, .kind = atlas::PlacementKind::color};

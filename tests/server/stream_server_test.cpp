@@ -80,7 +80,7 @@ class StreamServerTest : public test::StreamingTest {
 
   static SessionSettings small() {
     SessionSettings s;
-    s.layout = atlas::blocks::settings_for(512, 256);
+    s.layout = atlas::layout_settings(atlas::LayoutKind::blocks, 512, 256);
     s.rate.bitrate_bps = 20e6;
     return s;
   }

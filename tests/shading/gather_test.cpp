@@ -13,13 +13,14 @@ using atlas::PlacementKind;
 
 Placement block(scene::PatchId patch, uint32_t x, uint32_t y, uint8_t log_w, uint8_t log_h,
                 bool transposed = false, bool masked = false) {
-  return {patch,
-          PlacementKind::block,
-          {log_w, log_h},
-          static_cast<uint16_t>(x),
-          static_cast<uint16_t>(y),
-          transposed,
-          masked};
+  return {.patch = patch,
+          .kind = PlacementKind::block,
+          .x = static_cast<uint16_t>(x),
+          .y = static_cast<uint16_t>(y),
+          .width = static_cast<uint16_t>(1u << log_w),
+          .height = static_cast<uint16_t>(1u << log_h),
+          .transposed = transposed,
+          .masked = masked};
 }
 
 float linear(uint8_t byte) {
@@ -58,10 +59,10 @@ TEST_P(BothPaths, CornersLieAtTexelCentres) {
           const vec2 corner = scene::patch_corner(triangles, t, c);
           const vec2 along = p.transposed ? vec2(corner.y, corner.x) : corner;
           const uint32_t x =
-              p.x + static_cast<uint32_t>(std::lround(along.x * static_cast<float>(p.width() - 1)));
+              p.x + static_cast<uint32_t>(std::lround(along.x * static_cast<float>(p.width - 1)));
           const uint32_t y =
-              p.y + static_cast<uint32_t>(std::lround(along.y * static_cast<float>(p.height() - 1)));
-          if (triangles == 3 && p.width() == 2) continue;  // the tip shares a corner's texel
+              p.y + static_cast<uint32_t>(std::lround(along.y * static_cast<float>(p.height - 1)));
+          if (triangles == 3 && p.width == 2) continue;  // the tip shares a corner's texel
           EXPECT_NEAR(linear(r.atlas.at(x, y)[0]), corner.x, 0.01f) << triangles << " at " << x << "," << y;
           EXPECT_NEAR(linear(r.atlas.at(x, y)[1]), corner.y, 0.01f) << triangles << " at " << x << "," << y;
           EXPECT_EQ(r.atlas.at(x, y)[3], 255);

@@ -1,0 +1,219 @@
+#include "atlas/coherent/layout.h"
+
+#include <algorithm>
+
+#include "atlas/coherent/rectangles.h"
+#include "atlas/coherent/slabs.h"
+#include "atlas/coherent/spacing.h"
+
+namespace tessera::atlas::coherent {
+namespace {
+
+constexpr uint32_t kMaxSide = 8192;  // texels
+constexpr uint64_t kStages = 16;     // of re-placing the atlas: a frame moves at most this part of it
+constexpr float kFullest = 0.75f;    // slabs with a larger share in use are not worth emptying
+constexpr int kPauseFrames = 15;     // between two stages that helped nobody
+
+Status check(const LayoutSettings& s) {
+  for (const uint32_t side : {s.width, s.height}) {
+    if (side < 2 || side > kMaxSide || side % 2 != 0)
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "atlas layout: size %dx%d, both sides must be even, 2 to %d", s.width, s.height, kMaxSide));
+  }
+  return absl::OkStatus();
+}
+
+RectangleSize size_of(const Placement& p) {
+  const auto w = static_cast<uint16_t>(p.color_width()), h = static_cast<uint16_t>(p.color_height());
+  return p.transposed ? RectangleSize{h, w} : RectangleSize{w, h};
+}
+
+}  // namespace
+
+struct Layout::Impl {
+  Impl(const scene::Scene& s, const LayoutSettings& l)
+      : scene(s), settings(l), traits(s), slabs(l.width, l.height), target(l.width * double(l.height)) {}
+
+  LayoutDelta update(const LayoutInput& input);
+  void follow_bias(const scene::VisiblePatches& visible);
+  void choose(const LayoutInput& input);
+  void choose_one(scene::PatchId patch, const Wanted& wanted, const Placement* was, const Spacing& spacing);
+  void allocate();
+  void count(const LayoutDelta& delta);
+  void plan_next_frame();
+  void free(const Placement& p) {
+    if (p.kind == PlacementKind::block) slabs.free({p.x, p.y}, p.height);
+  }
+
+  const scene::Scene& scene;
+  LayoutSettings settings;
+  PatchTraitTable traits;
+  Slabs slabs;
+  AdaptiveTarget target;
+  BiasFollower bias;
+  LayoutStats stats;
+  bool memory_short = false;  // after the last frame: rectangles may not grow
+  int frames_to_next_stage = 0, frames_since_shrink = kPauseFrames;
+
+  std::vector<Placement> now, before;   // sorted by patch
+  std::vector<scene::PatchId> starved;  // without a rectangle for want of memory; sorted
+  // Of this frame; kept to keep their memory.
+  std::vector<Wanted> wanted;              // a visible patch
+  std::vector<uint32_t> moving, entering;  // indices of `now` that need a rectangle; moving ones had one
+};
+
+LayoutDelta Layout::Impl::update(const LayoutInput& input) {
+  follow_bias(input.visible);
+  choose(input);
+  allocate();
+  slabs.reopen();
+  const LayoutDelta delta = difference(before, now);
+  count(delta);
+  plan_next_frame();
+  return delta;
+}
+
+void Layout::Impl::follow_bias(const scene::VisiblePatches& visible) {
+  wanted.clear();
+  stats.ideal_texels = 0;
+  for (const scene::VisiblePatch& v : visible) {
+    const PatchTraits t = traits[v.patch];
+    wanted.push_back({rectangle_need(v.footprint, t.triangle_count), t.masked});
+    stats.ideal_texels += wanted.back().need.area * (t.masked ? 2 : 1);
+  }
+  stats.bias = bias.follow(select_bias(wanted, target.texels(), settings.levels));
+}
+
+// Merges the visible patches with those of the last frame.
+void Layout::Impl::choose(const LayoutInput& input) {
+  std::swap(now, before);
+  for (auto* list : {&moving, &entering}) list->clear();
+  now.clear();
+  auto old = before.begin();
+  uint32_t instance = 0;
+  for (size_t i = 0; i < input.visible.size(); ++i) {
+    const scene::PatchId patch = input.visible[i].patch;
+    for (; old != before.end() && old->patch < patch; ++old) free(*old);
+    while (instance + 1 < scene.instances.size() && scene.instances[instance + 1].first_patch <= patch)
+      ++instance;
+    const scene::Instance& owner = scene.instances[instance];
+    const scene::Geometry& geometry = scene.geometries[owner.geometry];
+    const Spacing spacing = spacing_for(geometry, geometry.patches[patch - owner.first_patch],
+                                        input.transforms[instance], input.eye);
+    const bool known = old != before.end() && old->patch == patch;
+    choose_one(patch, wanted[i], known ? &*old : nullptr, spacing);
+    if (known) ++old;
+  }
+  for (; old != before.end(); ++old) free(*old);
+}
+
+// `was`: or nullptr for a patch that was not visible.
+void Layout::Impl::choose_one(scene::PatchId patch, const Wanted& want, const Placement* was,
+                              const Spacing& spacing) {
+  const bool had_place = was && was->kind == PlacementKind::block;
+  const bool moves = had_place && slabs.closed({was->x, was->y});
+  // A patch that is placed anew anyway takes the size that fits it best.
+  const bool anchored =
+      was && !moves && (had_place || !std::binary_search(starved.begin(), starved.end(), patch));
+  const RectangleSize held = had_place ? size_of(*was) : RectangleSize{};
+  const RectangleSize size =
+      select_size(want.need, want.masked, stats.bias, anchored ? &held : nullptr, settings.levels);
+
+  const auto index = static_cast<uint32_t>(now.size());
+  Placement& p = now.emplace_back(Placement{.patch = patch, .masked = want.masked});
+  if (size.single_color()) {
+    if (had_place) free(*was);
+    return;
+  }
+  const uvec2 sides = sides_of(size, want.masked);
+  const bool waits = memory_short && had_place && !moves && sides.x * sides.y > was->texels();
+  if (had_place && !moves && (size == held || waits)) {
+    p = *was;
+    if (!still_good(was->spacing, spacing)) p.spacing = spacing;
+    return;
+  }
+  p.kind = PlacementKind::block;
+  p.width = static_cast<uint16_t>(sides.x);
+  p.height = static_cast<uint16_t>(sides.y);
+  p.transposed = size.u > size.v;  // the short side is the width
+  p.spacing = spacing;
+  if (had_place) free(*was);
+  (had_place ? moving : entering).push_back(index);
+}
+
+void Layout::Impl::allocate() {
+  // Wide ones first: what is left serves the narrow ones. Among equals in the order of patches: neighbours on
+  // a surface look alike, which video coding likes.
+  const auto wider = [this](uint32_t a, uint32_t b) {
+    return now[a].width != now[b].width ? now[a].width > now[b].width : a < b;
+  };
+  starved.clear();
+  // Who had a place comes first: losing it would show more than not getting one.
+  for (auto* list : {&moving, &entering}) {
+    std::sort(list->begin(), list->end(), wider);
+    for (const uint32_t index : *list) {
+      Placement& p = now[index];
+      if (const auto at = slabs.allocate(p.width, p.height)) {
+        p.x = static_cast<uint16_t>(at->x);
+        p.y = static_cast<uint16_t>(at->y);
+      } else {
+        p = {.patch = p.patch, .masked = p.masked};
+        starved.push_back(p.patch);
+      }
+    }
+  }
+  std::sort(starved.begin(), starved.end());
+}
+
+void Layout::Impl::count(const LayoutDelta& delta) {
+  const SlabStats memory = slabs.stats();
+  stats.target_share = target.texels() / static_cast<double>(memory.capacity_texels);
+  stats.used_texels = memory.used_texels;
+  stats.stack_texels = memory.slab_texels - memory.used_texels;
+  const auto is_color = [](const Placement& p) { return p.kind == PlacementKind::color; };
+  stats.colors = static_cast<uint32_t>(std::count_if(now.begin(), now.end(), is_color));
+  stats.blocks = static_cast<uint32_t>(now.size()) - stats.colors;
+  stats.colors_out_of_memory = static_cast<uint32_t>(starved.size());
+  stats.changed = static_cast<uint32_t>(delta.changed.size());
+  stats.removed = static_cast<uint32_t>(delta.removed.size());
+}
+
+// Chooses the slabs that the next frame empties, and calibrates the target (thesis 3.5).
+void Layout::Impl::plan_next_frame() {
+  const bool is_starved = !starved.empty();
+  memory_short = is_starved || slabs.free_share() < 1 - settings.high_water;
+  stats.reset = false;
+  if (frames_to_next_stage > 0) --frames_to_next_stage;
+  if (memory_short && frames_to_next_stage == 0) {
+    slabs.close_emptiest(uint64_t{settings.width} * settings.height / kStages, kFullest);
+    stats.reset = true;
+    ++stats.resets_total;
+    frames_to_next_stage = is_starved ? 1 : kPauseFrames;
+  }
+  ++frames_since_shrink;
+  if (is_starved && frames_since_shrink >= kPauseFrames) {
+    target.on_out_of_memory();
+    frames_since_shrink = 0;
+  } else if (!memory_short && stats.bias > settings.levels.min_bias) {
+    target.on_quiet_frame();
+  }
+}
+
+StatusOr<std::unique_ptr<Layout>> Layout::create(const scene::Scene& scene, const LayoutSettings& settings) {
+  TESSERA_RETURN_IF_ERROR(check(settings));
+  return std::unique_ptr<Layout>(new Layout(std::make_unique<Impl>(scene, settings)));
+}
+
+Layout::Layout(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Layout::~Layout() = default;
+LayoutDelta Layout::update(const LayoutInput& input) {
+  return impl_->update(input);
+}
+std::span<const Placement> Layout::placements() const {
+  return impl_->now;
+}
+const LayoutStats& Layout::stats() const {
+  return impl_->stats;
+}
+
+}  // namespace tessera::atlas::coherent

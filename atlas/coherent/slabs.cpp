@@ -1,0 +1,166 @@
+#include "atlas/coherent/slabs.h"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+
+namespace tessera::atlas::coherent {
+namespace {
+
+using Bits = unsigned __int128;
+
+Bits low_bits(uint32_t count) {
+  return count >= 128 ? ~Bits{0} : (Bits{1} << count) - 1;
+}
+
+int lowest_bit(Bits bits) {
+  const auto low = static_cast<uint64_t>(bits);
+  return low ? std::countr_zero(low) : 64 + std::countr_zero(static_cast<uint64_t>(bits >> 64));
+}
+
+// Index of the first run of `length` ones, or -1.
+int find_run(Bits bits, uint32_t length) {
+  // After each step a bit stands for a run of `have` ones that starts there.
+  for (uint32_t have = 1; have < length && bits;) {
+    const uint32_t step = std::min(have, length - have);
+    bits &= bits >> step;
+    have += step;
+  }
+  return bits ? lowest_bit(bits) : -1;
+}
+
+}  // namespace
+
+Slabs::Slabs(uint32_t width, uint32_t height) {
+  assert(width % kUnit == 0 && height % kUnit == 0);
+  for (uint32_t y = 0; y < height; y += kShelfHeight) {
+    const uint32_t units = width / kUnit;
+    shelves_.push_back({.units = std::min(kShelfHeight, height - y) / kUnit,
+                        .free_units = units,
+                        .taken = std::vector<uint8_t>(units),
+                        .slab_of_x = std::vector<uint32_t>(units)});
+  }
+}
+
+std::optional<uvec2> Slabs::take(uint32_t index, uint32_t rows) {
+  Slab& slab = slabs_[index];
+  const int at = slab.closed ? -1 : find_run(slab.free_rows, rows);
+  if (at < 0) return std::nullopt;
+  slab.free_rows &= ~(low_bits(rows) << at);
+  slab.used = static_cast<uint16_t>(slab.used + rows);
+  used_texels_ += uint64_t{rows} * slab.width * kUnit * kUnit;
+  return uvec2(slab.x * kUnit, slab.shelf * kShelfHeight + static_cast<uint32_t>(at) * kUnit);
+}
+
+std::optional<uvec2> Slabs::take_from_width(uint32_t width, uint32_t rows) {
+  for (const uint32_t index : by_width_[width]) {
+    const Slab& slab = slabs_[index];
+    if (slab.used + rows > shelves_[slab.shelf].units) continue;
+    if (const auto at = take(index, rows)) return at;
+  }
+  return std::nullopt;
+}
+
+std::optional<uvec2> Slabs::allocate(uint32_t width, uint32_t height) {
+  assert(width >= kUnit && width <= kShelfHeight && height >= kUnit && height <= kShelfHeight);
+  const uint32_t units = width / kUnit, rows = height / kUnit;
+  if (const auto at = take_from_width(units, rows)) return at;
+  if (const auto slab = draw_slab(units, rows)) return take(*slab, rows);
+  // Better a little too wide than none.
+  for (uint32_t wider = units + 1; wider <= std::min(2 * units, kShelfHeight / kUnit); ++wider) {
+    if (const auto at = take_from_width(wider, rows)) return at;
+  }
+  return std::nullopt;
+}
+
+std::optional<uint32_t> Slabs::draw_slab(uint32_t width, uint32_t rows) {
+  for (uint32_t s = 0; s < shelves_.size(); ++s) {
+    Shelf& shelf = shelves_[s];
+    if (shelf.free_units < width || shelf.units < rows) continue;
+    const auto gap = std::search_n(shelf.taken.begin(), shelf.taken.end(), width, 0);
+    if (gap == shelf.taken.end()) continue;
+    std::fill_n(gap, width, uint8_t{1});
+    shelf.free_units -= width;
+    if (unused_.empty()) {
+      unused_.push_back(static_cast<uint32_t>(slabs_.size()));
+      slabs_.emplace_back();
+    }
+    const uint32_t index = unused_.back();
+    unused_.pop_back();
+    const auto x = static_cast<uint16_t>(gap - shelf.taken.begin());
+    slabs_[index] = {.x = x,
+                     .width = static_cast<uint16_t>(width),
+                     .shelf = static_cast<uint16_t>(s),
+                     .free_rows = low_bits(shelf.units)};
+    shelf.slab_of_x[x] = index;
+    by_width_[width].push_back(index);
+    return index;
+  }
+  return std::nullopt;
+}
+
+void Slabs::free(uvec2 at, uint32_t height) {
+  const uint32_t index = index_at(at), rows = height / kUnit;
+  Slab& slab = slabs_[index];
+  const Bits freed = low_bits(rows) << (at.y % kShelfHeight / kUnit);
+  assert((slab.free_rows & freed) == 0);
+  slab.free_rows |= freed;
+  slab.used = static_cast<uint16_t>(slab.used - rows);
+  used_texels_ -= uint64_t{rows} * slab.width * kUnit * kUnit;
+  if (slab.used == 0) release(index);
+}
+
+void Slabs::release(uint32_t index) {
+  const Slab& slab = slabs_[index];
+  Shelf& shelf = shelves_[slab.shelf];
+  std::fill_n(shelf.taken.begin() + slab.x, slab.width, uint8_t{0});
+  shelf.free_units += slab.width;
+  std::erase(by_width_[slab.width], index);
+  unused_.push_back(index);
+}
+
+void Slabs::close_emptiest(uint64_t budget_texels, float fullest) {
+  struct Candidate {
+    float share;
+    uint32_t index;
+  };
+  std::vector<Candidate> candidates;
+  for (const auto& slabs : by_width_) {
+    for (const uint32_t index : slabs) {
+      const Slab& slab = slabs_[index];
+      const float share = static_cast<float>(slab.used) / static_cast<float>(shelves_[slab.shelf].units);
+      if (share <= fullest) candidates.push_back({share, index});
+    }
+  }
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return a.share != b.share ? a.share < b.share : a.index < b.index;
+  });
+  for (const Candidate& candidate : candidates) {
+    Slab& slab = slabs_[candidate.index];
+    const uint64_t texels = uint64_t{slab.used} * slab.width * kUnit * kUnit;
+    if (texels > budget_texels) return;
+    budget_texels -= texels;
+    slab.closed = true;
+  }
+}
+
+void Slabs::reopen() {
+  for (Slab& slab : slabs_) slab.closed = false;
+}
+
+SlabStats Slabs::stats() const {
+  SlabStats stats{.used_texels = used_texels_};
+  for (const Shelf& shelf : shelves_) {
+    const uint64_t height = uint64_t{shelf.units} * kUnit;
+    stats.capacity_texels += shelf.taken.size() * kUnit * height;
+    stats.slab_texels += (shelf.taken.size() - shelf.free_units) * kUnit * height;
+  }
+  return stats;
+}
+
+float Slabs::free_share() const {
+  const SlabStats all = stats();
+  return 1 - static_cast<float>(all.slab_texels) / static_cast<float>(all.capacity_texels);
+}
+
+}  // namespace tessera::atlas::coherent

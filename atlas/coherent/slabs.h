@@ -1,0 +1,83 @@
+// Memory of layout `coherent`. The atlas is cut into shelves, a shelf into slabs side by side, a slab into
+// rectangles one below another:
+//
+//   shelf   across the atlas, kShelfHeight texels high (the last may be lower)
+//   slab    as wide as its rectangles, as high as the shelf; drawn when its width runs out of room
+//   rect    of the slab's width and any even height
+//
+// So both dimensions are packed as intervals of a line, where free neighbours merge by themselves: unlike
+// power-of-two blocks on stacks, freed room serves every height, and an empty slab every width.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "base/math.h"
+
+namespace tessera::atlas::coherent {
+
+constexpr uint32_t kShelfHeight = 256;  // texels; the largest side of a rectangle, too
+
+struct SlabStats {
+  uint64_t used_texels = 0;      // in rectangles
+  uint64_t slab_texels = 0;      // in slabs
+  uint64_t capacity_texels = 0;  // of the atlas
+};
+
+// Equal calls give equal results. Not thread-safe.
+class Slabs {
+ public:
+  // Sides of the atlas: even, at most 8192.
+  Slabs(uint32_t width, uint32_t height);
+
+  // Upper left texel of a free rectangle, or nothing if there is no room. Sides: even, 2..kShelfHeight. First
+  // fit, in the slabs of its width, in a new slab, or in the narrowest wider one that has room.
+  std::optional<uvec2> allocate(uint32_t width, uint32_t height);
+  // Gives back what allocate() returned for this height.
+  void free(uvec2 at, uint32_t height);
+
+  // Closes the emptiest slabs to allocate(), together holding at most `budget_texels` in rectangles: once
+  // these are freed and placed elsewhere, the slabs return to the shelves. Slabs above `fullest` (share in
+  // use) stay open.
+  void close_emptiest(uint64_t budget_texels, float fullest);
+  bool closed(uvec2 at) const { return slab_at(at).closed; }
+  void reopen();
+
+  SlabStats stats() const;
+  // Width of free room in the shelves, as a share of them: new slabs can be drawn from it.
+  float free_share() const;
+
+ private:
+  static constexpr uint32_t kUnit = 2;  // texels
+  using Rows = unsigned __int128;       // a bit for each unit of a slab's height; 1 = free
+
+  struct Slab {
+    uint16_t x = 0, width = 0, shelf = 0;  // x, width in units
+    uint16_t used = 0;                     // units of height
+    bool closed = false;
+    Rows free_rows = 0;
+  };
+  struct Shelf {
+    uint32_t units = 0;               // of height
+    uint32_t free_units = 0;          // of width
+    std::vector<uint8_t> taken;       // a unit of width
+    std::vector<uint32_t> slab_of_x;  // by the slab's first unit
+  };
+
+  const Slab& slab_at(uvec2 at) const { return slabs_[index_at(at)]; }
+  uint32_t index_at(uvec2 at) const { return shelves_[at.y / kShelfHeight].slab_of_x[at.x / kUnit]; }
+  std::optional<uvec2> take(uint32_t slab, uint32_t rows);
+  std::optional<uvec2> take_from_width(uint32_t width, uint32_t rows);
+  std::optional<uint32_t> draw_slab(uint32_t width, uint32_t rows);
+  void release(uint32_t slab);
+
+  std::vector<Shelf> shelves_;
+  std::vector<Slab> slabs_;                                               // some unused
+  std::vector<uint32_t> unused_;                                          // indices of slabs_
+  std::array<std::vector<uint32_t>, kShelfHeight / kUnit + 1> by_width_;  // by units, in the order of drawing
+  uint64_t used_texels_ = 0;
+};
+
+}  // namespace tessera::atlas::coherent

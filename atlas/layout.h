@@ -1,0 +1,66 @@
+// A layout turns visible sets into placements, frame by frame.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "atlas/level_selection.h"
+#include "atlas/placement.h"
+#include "base/math.h"
+#include "base/status.h"
+#include "scene/visible_set.h"
+
+namespace tessera::atlas {
+
+enum class LayoutKind : uint8_t {
+  blocks,    // Shading Atlas Streaming: power-of-two blocks in superblocks and columns
+  coherent,  // rectangles of any even sides in slabs, samples spaced as the eye sees them
+};
+constexpr std::string_view kLayoutNames[] = {"blocks", "coherent"};  // by LayoutKind
+
+struct LayoutSettings {
+  LayoutKind kind = LayoutKind::blocks;
+  uint32_t width = 2048, height = 1024;  // texels; blocks: multiples of the superblock's side; at most 8192
+  uint8_t superblock_log = 8;            // blocks
+  float high_water = 0.96f;              // share of the memory in use above which it is re-placed, in stages
+  LevelSettings levels;
+};
+
+// Settings of a layout for an atlas of this size.
+LayoutSettings layout_settings(LayoutKind kind, uint32_t width, uint32_t height);
+
+struct LayoutInput {
+  const scene::VisiblePatches& visible;
+  dvec3 eye{0};                         // world; where samples are spaced for
+  std::span<const dmat4> transforms{};  // world matrix of each instance of the scene
+};
+
+struct LayoutStats {
+  float bias = 0;
+  double target_share = 0;
+  double ideal_texels = 0;
+  uint64_t used_texels = 0;   // in blocks
+  uint64_t stack_texels = 0;  // fragmented: free, but not for every block
+  uint32_t blocks = 0, colors = 0, colors_out_of_memory = 0;
+  uint32_t changed = 0, removed = 0;
+  bool reset = false;  // this frame re-placed everything, or a stage of it
+  uint32_t resets_total = 0;
+};
+
+// Per session. Not thread-safe.
+class Layout {
+ public:
+  virtual ~Layout() = default;
+  // Places the visible set. Patches that stay visible at their size keep their place. When memory runs out a
+  // patch falls back to a single colour.
+  virtual LayoutDelta update(const LayoutInput& input) = 0;
+  // All current placements, sorted by patch. Valid until the next update.
+  virtual std::span<const Placement> placements() const = 0;
+  virtual const LayoutStats& stats() const = 0;
+};
+
+// InvalidArgument if the settings do not fit. `scene` outlives the layout.
+StatusOr<std::unique_ptr<Layout>> create_layout(const scene::Scene& scene, const LayoutSettings& settings);
+
+}  // namespace tessera::atlas

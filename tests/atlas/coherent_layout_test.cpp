@@ -1,0 +1,212 @@
+#include "atlas/coherent/layout.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "atlas/coherent/rectangles.h"
+#include "atlas/coherent/spacing.h"
+#include "occupancy.h"
+
+namespace tessera::atlas::coherent {
+namespace {
+
+using scene::VisiblePatches;
+
+// Quads of 1 m in a row along -Z, on the ground; the second instance, 1 m to the right, is masked.
+scene::Scene make_scene(uint32_t patches) {
+  scene::Scene scene;
+  scene::Geometry& g = scene.geometries.emplace_back();
+  for (uint32_t i = 0; i < patches; ++i) {
+    const auto near = -static_cast<float>(i);
+    for (const vec3 p : {vec3(0, 0, near), vec3(1, 0, near), vec3(0, 0, near - 1), vec3(1, 0, near - 1)}) {
+      scene::Vertex v{};
+      v.position = p;
+      g.vertices.push_back(v);
+    }
+    for (const uint32_t corner : {0, 1, 2, 3, 2, 1}) g.indices.push_back(4 * i + corner);
+    g.patches.push_back({.first_triangle = 2 * i, .triangle_count = 2});
+  }
+  scene.materials.resize(2);
+  scene.materials[1].alpha_mode = scene::AlphaMode::mask;
+  scene.nodes.resize(2);
+  scene.nodes[1].translation = {1, 0, 0};
+  scene.instances = {{0, 0, 0}, {0, 1, 1}};
+  scene.index_instances();
+  return scene;
+}
+
+class CoherentLayout : public testing::Test {
+ protected:
+  void make(uint32_t patches, LayoutSettings settings = {}) {
+    scene_ = make_scene(patches);
+    settings_ = settings;
+    layout_ = *Layout::create(scene_, settings);
+    for (const scene::Instance& instance : scene_.instances)
+      transforms_.push_back(scene_.node_transforms(0)[instance.node]);
+  }
+
+  // One frame; a client that knows only the deltas must hold the same, and nothing overlaps.
+  LayoutDelta update(const VisiblePatches& visible, const dvec3& eye = {0.5, 1.7, 1}) {
+    LayoutDelta delta = layout_->update({visible, eye, transforms_});
+    for (const scene::PatchId patch : delta.removed) EXPECT_EQ(mirror_.erase(patch), 1u);
+    for (const Placement& p : delta.changed) {
+      EXPECT_TRUE(!mirror_.contains(p.patch) || mirror_[p.patch] != p);
+      mirror_[p.patch] = p;
+    }
+    EXPECT_EQ(mirror_.size(), visible.size());
+    Occupancy occupancy(settings_.width, settings_.height);
+    size_t i = 0;
+    for (const Placement& p : layout_->placements()) {
+      EXPECT_EQ(p.patch, visible[i++].patch);
+      EXPECT_EQ(mirror_.at(p.patch), p);
+      if (p.kind == PlacementKind::color) continue;
+      EXPECT_TRUE(p.x % 2 == 0 && p.y % 2 == 0 && p.width % 2 == 0 && p.height % 2 == 0);
+      EXPECT_TRUE(p.color_width() % 2 == 0 && p.color_height() % 2 == 0) << "a half owns its chroma samples";
+      EXPECT_TRUE(occupancy.take(p.x, p.y, p.width, p.height)) << p.patch;
+    }
+    EXPECT_EQ(layout_->stats().used_texels, occupancy.texels());
+    return delta;
+  }
+
+  scene::Scene scene_;
+  LayoutSettings settings_;
+  std::vector<dmat4> transforms_;
+  std::unique_ptr<Layout> layout_;
+  std::map<scene::PatchId, Placement> mirror_;
+};
+
+VisiblePatches rectangles(uint32_t count, float u, float v) {
+  VisiblePatches visible;
+  for (uint32_t i = 0; i < count; ++i) visible.push_back({i, {u, v, u * v}});
+  return visible;
+}
+
+TEST_F(CoherentLayout, RefusesOddAndHugeAtlases) {
+  const scene::Scene scene = make_scene(1);
+  for (const auto& [width, height] : {std::pair{0u, 256u}, {255u, 256u}, {256u, 8194u}})
+    EXPECT_EQ(Layout::create(scene, {.width = width, .height = height}).status().code(),
+              absl::StatusCode::kInvalidArgument);
+}
+
+TEST_F(CoherentLayout, RandomSetsKeepEveryRule) {
+  make(600, {.width = 512, .height = 320});
+  std::mt19937 random(3);
+  uint32_t starved = 0;
+  for (int frame = 0; frame < 150; ++frame) {
+    VisiblePatches visible;
+    const float zoom = std::exp2(4 * std::sin(0.1f * static_cast<float>(frame)));
+    for (scene::PatchId p = 0; p < scene_.patch_count; ++p) {
+      if (random() % 10 == 0) continue;
+      const float u = zoom * static_cast<float>(1 + p % 13), v = zoom * static_cast<float>(1 + p % 7);
+      visible.push_back({p, {u, v, u * v}});
+    }
+    update(visible, {0.5, 1.7, -0.5 * frame});
+    starved += layout_->stats().colors_out_of_memory;
+  }
+  EXPECT_LT(starved, 150u * 1200 / 10) << "memory runs out now and then, not always";
+}
+
+TEST_F(CoherentLayout, WhatStaysVisibleStaysInPlace) {
+  make(100);
+  update(rectangles(200, 20, 12));
+  EXPECT_TRUE(update(rectangles(200, 20, 12)).changed.empty());
+  EXPECT_TRUE(update(rectangles(200, 21, 12.5f)).changed.empty()) << "within the hysteresis";
+  VisiblePatches fewer = rectangles(200, 20, 12);
+  std::erase_if(fewer, [](const auto& v) { return v.patch % 3 == 0; });
+  EXPECT_TRUE(update(fewer).changed.empty());
+}
+
+TEST_F(CoherentLayout, SpacingIsFrozenWhileItIsGood) {
+  make(50);
+  const VisiblePatches visible = rectangles(50, 20, 20);
+  update(visible, {0.5, 1.7, 3});
+  const Placement before = mirror_.at(0);
+  EXPECT_GT(before.spacing[1], 0) << "the far edge is farther";
+  EXPECT_TRUE(update(visible, {0.5, 1.7, 3.1}).changed.empty());
+  const LayoutDelta delta = update(visible, {0.5, 1.7, 0.2});
+  EXPECT_FALSE(delta.changed.empty());
+  const Placement after = mirror_.at(0);
+  EXPECT_NE(after.spacing, before.spacing);
+  EXPECT_TRUE(after.x == before.x && after.y == before.y && after.width == before.width);
+}
+
+TEST_F(CoherentLayout, AFullAtlasFallsBackToColorsAndRecovers) {
+  make(2000, {.width = 256, .height = 256, .levels = {.max_bias = 0}});
+  update(rectangles(2000, 20, 20));
+  EXPECT_GT(layout_->stats().colors_out_of_memory, 0u);
+  EXPECT_GT(layout_->stats().used_texels, 256u * 256 * 9 / 10);
+  for (int i = 0; i < 5; ++i) update(rectangles(100, 20, 20));
+  EXPECT_EQ(layout_->stats().colors_out_of_memory, 0u);
+}
+
+TEST(Rectangles, SamplesAreEquallyDenseWhateverTheShape) {
+  for (float u = 8; u <= 200; u *= 1.13f) {
+    for (float v = 8; v <= 200; v *= 1.17f) {
+      const RectangleNeed need = rectangle_need({u, v, u * v}, 2);
+      const RectangleSize size = select_size(need, false, 0, nullptr, {});
+      // Intervals a pixel, both ways together.
+      const float density = float(size.u - 1) * float(size.v - 1) / (u * v);
+      EXPECT_NEAR(std::log2(density), 0, 0.45f) << u << "x" << v;
+      EXPECT_EQ(sides_of(size, false).x, std::min(size.u, size.v));
+      EXPECT_EQ(sides_of(size, true).y, 2 * std::max(size.u, size.v));
+    }
+  }
+}
+
+TEST(Rectangles, ASmallerTargetNeverGivesASmallerBiasAndIsMet) {
+  std::mt19937 random(5);
+  std::vector<Wanted> wanted;
+  for (int i = 0; i < 3000; ++i) {
+    const float u = std::exp2(static_cast<float>(random() % 90) / 10),
+                v = u * static_cast<float>(1 + random() % 9) / 5;
+    wanted.push_back({rectangle_need({u, v, u * v}, static_cast<uint8_t>(1 + i % 3)), i % 7 == 0});
+  }
+  float before = -10;
+  for (double target = 4e6; target > 1e4; target *= 0.8) {
+    const float bias = select_bias(wanted, target, {});
+    EXPECT_GE(bias, before);
+    before = bias;
+    uint64_t texels = 0;
+    for (const Wanted& w : wanted) {
+      const RectangleSize size = select_size(w.need, w.masked, bias, nullptr, {});
+      texels += uint64_t{size.u} * size.v * (w.masked ? 2 : 1);
+    }
+    EXPECT_TRUE(static_cast<double>(texels) <= target || bias == LevelSettings{}.max_bias);
+  }
+}
+
+TEST(Rectangles, AnyFootprintGivesAValidSize) {
+  constexpr float kInf = std::numeric_limits<float>::infinity(),
+                  kNan = std::numeric_limits<float>::quiet_NaN();
+  const float values[] = {0, 1e-38f, 1e-3f, 1, 300, 1e7f, 3e38f, kInf, kNan, -1};
+  for (const float u : values)
+    for (const float v : values)
+      for (const float area : values)
+        for (const bool masked : {false, true}) {
+          const RectangleSize size = select_size(rectangle_need({u, v, area}, 2), masked, 0, nullptr, {});
+          if (size.single_color()) continue;
+          const uvec2 sides = sides_of(size, masked);
+          EXPECT_TRUE(sides.x >= 2 && sides.y <= 256 && sides.x <= sides.y && sides.x % 2 == 0 &&
+                      sides.y % 2 == 0);
+        }
+}
+
+TEST(Spacing, DistancesAreOnAScaleOfOctaves) {
+  scene::Scene scene = make_scene(1);
+  const scene::Geometry& g = scene.geometries[0];
+  // From the first corner's side: the far corners are 1 m farther.
+  const Spacing spacing = spacing_for(g, g.patches[0], dmat4(1), {0, 0, 1});
+  EXPECT_EQ(spacing[1], 21) << "twice as far: an octave";
+  EXPECT_EQ(spacing[0], std::lround(21 * std::log2(std::sqrt(2.0))));
+  // At a corner, and at the first.
+  EXPECT_EQ(spacing_for(g, g.patches[0], dmat4(1), {1, 0, 0})[0], -126);
+  EXPECT_EQ(spacing_for(g, g.patches[0], dmat4(1), {0, 0, 0}), Spacing{});
+  const dmat4 nan(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(spacing_for(g, g.patches[0], nan, {0, 0, 1}), Spacing{});
+}
+
+}  // namespace
+}  // namespace tessera::atlas::coherent

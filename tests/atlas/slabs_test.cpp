@@ -1,0 +1,102 @@
+#include "atlas/coherent/slabs.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "occupancy.h"
+
+namespace tessera::atlas::coherent {
+namespace {
+
+struct Rect {
+  uvec2 at, size;
+};
+
+// No two rectangles overlap, and the counters tell what is there.
+void check(const Slabs& slabs, const std::vector<Rect>& rects, uint32_t width, uint32_t height) {
+  Occupancy occupancy(width, height);
+  for (const Rect& r : rects) ASSERT_TRUE(occupancy.take(r.at.x, r.at.y, r.size.x, r.size.y));
+  EXPECT_EQ(slabs.stats().used_texels, occupancy.texels());
+  EXPECT_LE(slabs.stats().used_texels, slabs.stats().slab_texels);
+  EXPECT_LE(slabs.stats().slab_texels, slabs.stats().capacity_texels);
+  EXPECT_EQ(slabs.stats().capacity_texels, uint64_t{width} * height);
+}
+
+TEST(Slabs, RandomUseNeverOverlaps) {
+  std::mt19937 random(1);
+  const auto side = [&] { return 2 + 2 * static_cast<uint32_t>(random() % 16 * (random() % 8 + 1)); };
+  for (const auto& [width, height] : {std::pair{512u, 512u}, {302u, 322u}, {64u, 8192u}, {8192u, 64u}}) {
+    Slabs slabs(width, height);
+    std::vector<Rect> rects;
+    for (int frame = 0; frame < 60; ++frame) {
+      for (size_t i = rects.size() / 4; i > 0; --i) {
+        std::swap(rects[random() % rects.size()], rects.back());
+        slabs.free(rects.back().at, rects.back().size.y);
+        rects.pop_back();
+      }
+      for (int i = 0; i < 200; ++i) {
+        const uvec2 size(side(), side());
+        if (const auto at = slabs.allocate(size.x, size.y)) rects.push_back({*at, size});
+      }
+      check(slabs, rects, width, height);
+    }
+    EXPECT_GT(static_cast<double>(slabs.stats().used_texels), 0.5 * width * height);
+    for (const Rect& r : rects) slabs.free(r.at, r.size.y);
+    EXPECT_EQ(slabs.stats().slab_texels, 0u) << "an emptied atlas serves every width again";
+  }
+}
+
+TEST(Slabs, ExactlyFullThenOneTooMany) {
+  Slabs slabs(256, 256);
+  std::vector<Rect> rects;
+  while (const auto at = slabs.allocate(16, 8)) rects.push_back({*at, {16, 8}});
+  EXPECT_EQ(rects.size(), 512u);
+  check(slabs, rects, 256, 256);
+  EXPECT_EQ(slabs.free_share(), 0);
+  EXPECT_FALSE(slabs.allocate(2, 2).has_value());
+  slabs.free(rects[100].at, 8);
+  EXPECT_EQ(slabs.allocate(16, 8), rects[100].at);
+}
+
+TEST(Slabs, FreedNeighboursServeAHigherRectangle) {
+  Slabs slabs(16, 256);
+  std::vector<uvec2> at;
+  for (int i = 0; i < 32; ++i) at.push_back(*slabs.allocate(16, 8));
+  slabs.free(at[10], 8);
+  EXPECT_FALSE(slabs.allocate(16, 16).has_value());
+  slabs.free(at[11], 8);
+  EXPECT_EQ(slabs.allocate(16, 16), at[10]);
+}
+
+TEST(Slabs, ANarrowRectangleTakesAWiderSlabBeforeItGoesWithout) {
+  Slabs slabs(24, 256);
+  slabs.allocate(24, 200);
+  const auto at = slabs.allocate(16, 50);
+  ASSERT_TRUE(at.has_value());
+  EXPECT_EQ(*at, uvec2(0, 200));
+  EXPECT_FALSE(slabs.allocate(4, 4).has_value()) << "not one that is twice as wide";
+  slabs.free({0, 0}, 200);
+  slabs.free(*at, 50);
+  EXPECT_EQ(slabs.stats().used_texels, 0u);
+}
+
+TEST(Slabs, ClosedSlabsAreTheEmptiestAndTakeNothing) {
+  Slabs slabs(64, 256);
+  const uvec2 full = *slabs.allocate(16, 256), half = *slabs.allocate(32, 128),
+              sparse = *slabs.allocate(8, 2);
+  slabs.close_emptiest(8 * 2, 0.75f);
+  EXPECT_TRUE(slabs.closed(sparse));
+  EXPECT_FALSE(slabs.closed(half) || slabs.closed(full));
+  slabs.close_emptiest(uint64_t{1} << 30, 0.75f);
+  EXPECT_TRUE(slabs.closed(half));
+  EXPECT_FALSE(slabs.closed(full)) << "fuller than asked for";
+  EXPECT_FALSE(slabs.allocate(32, 8).has_value());
+  slabs.free(half, 128);
+  EXPECT_TRUE(slabs.allocate(32, 8).has_value()) << "an emptied slab returns to its shelf";
+  slabs.reopen();
+  EXPECT_FALSE(slabs.closed(sparse));
+}
+
+}  // namespace
+}  // namespace tessera::atlas::coherent
