@@ -3,12 +3,15 @@
 
 namespace tessera::client::gles {
 
-// Reads: a triangle record (scene_state.h), vertex positions, and three texels an object: the rows of mesh
-// space to metres relative to the eye. Writes: the corner's texel in the atlas, and what the whole triangle
-// shares.
-constexpr const char* kSceneVertex = R"(#version 300 es
+constexpr const char* kScenePrelude = R"(#version 300 es
 precision highp float;
 precision highp int;
+)";
+
+// After kScenePrelude and atlas::addressing::kGlslText. Reads: a triangle record (scene_state.h), vertex
+// positions, and three texels an object: the rows of mesh space to metres relative to the eye. Writes: the
+// corner's texel in the atlas, and what the whole triangle shares.
+constexpr const char* kSceneVertex = R"(
 uniform highp usampler2D records;
 uniform highp sampler2D vertices;
 uniform highp sampler2D transforms;
@@ -19,33 +22,20 @@ flat out vec4 texel_bounds;     // centres of the first and last texel of the bl
 flat out vec2 coverage_offset;  // from a texel to its coverage
 flat out vec4 single_color;     // a = 1: no block
 
-// Block coordinates by corner kind and corner (scene::patch_corner).
-const vec2 kCorners[18] = vec2[18](
-  vec2(0.0, 0.0), vec2(1.0, 0.0), vec2(0.0, 1.0),
-  vec2(0.0, 0.0), vec2(1.0, 0.0), vec2(0.0, 1.0),
-  vec2(1.0, 1.0), vec2(0.0, 1.0), vec2(1.0, 0.0),
-  vec2(0.0, 0.0), vec2(1.0, 0.0), vec2(0.5, 1.0),
-  vec2(0.0, 1.0), vec2(0.0, 0.0), vec2(0.5, 1.0),
-  vec2(1.0, 0.0), vec2(1.0, 1.0), vec2(0.5, 1.0));
-
 ivec2 table_texel(int i) { return ivec2(i & 2047, i >> 11); }
 
 void set_block(uvec4 record, int corner) {
   ivec2 origin = 2 * ivec2(int(record.w & 0xfffu), int(record.w >> 12 & 0xfffu));
   ivec2 size = ivec2(2 << int(record.w >> 24 & 7u), 2 << int(record.w >> 27 & 7u));
   bool masked = (record.x >> 26 & 1u) != 0u;
-  ivec2 to_coverage = ivec2(0);
-  if (masked) {  // coverage lies beside the colour, or below it
-    to_coverage = size.x > size.y ? ivec2(size.x / 2, 0) : ivec2(0, size.y / 2);
-    size -= to_coverage;
-  }
-  vec2 position = kCorners[3 * int(record.x >> 22 & 7u) + corner];
+  int kind = int(record.x >> 22 & 7u);
+  int count = kind == 0 ? 1 : kind < 3 ? 2 : 3;
+  vec2 position = block_corner(count, kind - count * (count - 1) / 2, corner);
   if ((record.x >> 25 & 1u) != 0u) position = position.yx;
-  vec2 last = vec2(size - 1);
-  // Half-texel inset; corners lie at texel centres, rounded (atlas/placement.h).
-  texel = vec2(origin) + floor(position * last + 0.5) + 0.5;
+  vec2 last = vec2(block_color_size(size, masked) - 1);
+  texel = vec2(origin) + block_corner_texel(position, last) + 0.5;
   texel_bounds = vec4(vec2(origin) + 0.5, vec2(origin) + last + 0.5);
-  coverage_offset = vec2(to_coverage);
+  coverage_offset = masked ? vec2(block_coverage_offset(size)) : vec2(0.0);
 }
 
 void main() {
