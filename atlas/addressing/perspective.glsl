@@ -8,7 +8,7 @@
 // Where a sample lies: lambda_i ~ s_i / w_i. For s in the triangle; outside the sum may vanish. As one corner's w goes to 0, all
 // samples that it has a part in go to it: hence the limits of the ratios.
 INLINE vec3 to_surface(vec3 s, vec2 ratios) {
-  vec3 p = vec3(s.x * ratios.x * ratios.y, s.y * ratios.y, s.z * ratios.x);
+  vec3 p = vec3(s.x * (ratios.x * ratios.y), s.y * ratios.y, s.z * ratios.x);
   return p / (p.x + p.y + p.z);
 }
 
