@@ -1,23 +1,25 @@
-# One folder = one library `tessera_<name>` = one namespace `tessera::<name>`. This table is the only place that
+# One folder = one library `tessera_<name>` = one namespace `tessera::<name>`; a folder in a room that others may use without
+# the rest of it is a room of its own. This table is the only place that
 # says which room may use which (docs/architecture.md); tessera_check_rooms() fails the configure step when a target
 # links outside its list, and tests/architecture checks the #include lines.
-set(TESSERA_ROOMS base proto gpu scene pvs atlas shading codec geometry-compression transport client-sdk server bench)
+set(TESSERA_ROOMS base proto gpu scene pvs atlas/addressing atlas shading codec geometry-compression transport client-sdk server bench)
 set(TESSERA_MAY_USE_base "")
 set(TESSERA_MAY_USE_proto base)
 set(TESSERA_MAY_USE_gpu base)
 set(TESSERA_MAY_USE_scene base gpu)
 set(TESSERA_MAY_USE_pvs base gpu scene)
-set(TESSERA_MAY_USE_atlas base gpu scene)
-set(TESSERA_MAY_USE_shading base gpu scene atlas)
+set(TESSERA_MAY_USE_atlas/addressing "")
+set(TESSERA_MAY_USE_atlas base gpu scene atlas/addressing)
+set(TESSERA_MAY_USE_shading base gpu scene atlas atlas/addressing)
 set(TESSERA_MAY_USE_codec base gpu)
 set(TESSERA_MAY_USE_geometry-compression "")
 set(TESSERA_MAY_USE_transport base)
-set(TESSERA_MAY_USE_client-sdk base proto codec geometry-compression transport)
-set(TESSERA_MAY_USE_server base gpu scene pvs atlas shading codec geometry-compression transport proto)
+set(TESSERA_MAY_USE_client-sdk base proto atlas/addressing codec geometry-compression transport)
+set(TESSERA_MAY_USE_server base gpu scene pvs atlas atlas/addressing shading codec geometry-compression transport proto)
 set(TESSERA_MAY_USE_bench ${TESSERA_ROOMS})
 
 function(tessera_room_target room out)
-  string(REPLACE "-" "_" name ${room})
+  string(REGEX REPLACE "[-/]" "_" name ${room})
   set(${out} tessera_${name} PARENT_SCOPE)
 endfunction()
 

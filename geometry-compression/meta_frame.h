@@ -67,7 +67,7 @@ struct PatchPlacement {
   uint16_t width = 0, height = 0;
   bool transposed = false;
   // Of corners 1..4: log2 of the corner's distance from the eye that the block was made for, over that of
-  // corner 0, in steps of 6/127; -127..127. 0 for corners that the patch has not.
+  // corner 0, in 21 steps an octave; -126..126. 0 for corners that the patch has not.
   std::array<int8_t, 4> spacing{};
   uint32_t rgb = 0;  // kind color: 0xBBGGRR, sRGB
   bool operator==(const PatchPlacement&) const = default;

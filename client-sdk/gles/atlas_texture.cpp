@@ -37,7 +37,7 @@ void upload_plane(const Texture& texture, const uint8_t* data, uint32_t stride, 
 
 StatusOr<AtlasTexture> AtlasTexture::create() {
   AtlasTexture atlas;
-  TESSERA_ASSIGN_OR_RETURN(atlas.convert_, make_program(kFullScreenVertex, {kConvertFragment}));
+  TESSERA_ASSIGN_OR_RETURN(atlas.convert_, make_program({kFullScreenVertex}, {kConvertFragment}));
   set_sampler(atlas.convert_, "plane_y", 0);
   set_sampler(atlas.convert_, "plane_u", 1);
   set_sampler(atlas.convert_, "plane_v", 2);

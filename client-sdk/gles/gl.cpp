@@ -40,9 +40,9 @@ VertexArray make_vertex_array() {
   return generate<VertexArray, glGenVertexArrays>();
 }
 
-StatusOr<Program> make_program(const char* vertex_source,
+StatusOr<Program> make_program(std::initializer_list<const char*> vertex_source,
                                std::initializer_list<const char*> fragment_source) {
-  TESSERA_ASSIGN_OR_RETURN(const Shader vertex, compile(GL_VERTEX_SHADER, {vertex_source}));
+  TESSERA_ASSIGN_OR_RETURN(const Shader vertex, compile(GL_VERTEX_SHADER, vertex_source));
   TESSERA_ASSIGN_OR_RETURN(const Shader fragment, compile(GL_FRAGMENT_SHADER, fragment_source));
   Program program(glCreateProgram());
   glAttachShader(program.id(), vertex.id());

@@ -65,8 +65,9 @@ Texture make_texture();
 Renderbuffer make_renderbuffer();
 Framebuffer make_framebuffer();
 VertexArray make_vertex_array();
-// The fragment shader's source may come in parts.
-StatusOr<Program> make_program(const char* vertex_source, std::initializer_list<const char*> fragment_source);
+// Sources may come in parts.
+StatusOr<Program> make_program(std::initializer_list<const char*> vertex_source,
+                               std::initializer_list<const char*> fragment_source);
 
 // Filter GL_NEAREST or GL_LINEAR, no mip levels, clamped to the edge; the texture stays bound to
 // GL_TEXTURE_2D.

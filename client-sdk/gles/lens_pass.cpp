@@ -39,7 +39,8 @@ void set_fov(GLint location, const Fov& fov) {
 
 StatusOr<LensPass> LensPass::create() {
   LensPass pass;
-  TESSERA_ASSIGN_OR_RETURN(pass.program_, make_program(kFullScreenVertex, {kPicturePrelude, kLensFragment}));
+  TESSERA_ASSIGN_OR_RETURN(pass.program_,
+                           make_program({kFullScreenVertex}, {kPicturePrelude, kLensFragment}));
   set_sampler(pass.program_, "picture", 0);
   const auto location = [&](const char* name) { return glGetUniformLocation(pass.program_.id(), name); };
   pass.screen_ = location("screen");

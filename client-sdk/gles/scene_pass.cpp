@@ -3,6 +3,7 @@
 #include <glm/gtc/type_ptr.hpp>
 #include <span>
 
+#include "atlas/addressing/glsl_text.h"
 #include "client-sdk/gles/scene_shaders.h"
 #include "client-sdk/gles/shared_shaders.h"
 
@@ -21,7 +22,9 @@ std::span<const std::byte> bytes_of(const std::vector<T>& values) {
 StatusOr<ScenePass> ScenePass::create(ClipControl clip_control) {
   ScenePass pass;
   pass.clip_control_ = clip_control;
-  TESSERA_ASSIGN_OR_RETURN(pass.program_, make_program(kSceneVertex, {kPicturePrelude, kSceneFragment}));
+  TESSERA_ASSIGN_OR_RETURN(pass.program_,
+                           make_program({kScenePrelude, atlas::addressing::kGlslText, kSceneVertex},
+                                        {kPicturePrelude, kSceneFragment}));
   set_sampler(pass.program_, "records", kRecords);
   set_sampler(pass.program_, "vertices", kVertices);
   set_sampler(pass.program_, "transforms", kTransforms);

@@ -3,12 +3,15 @@
 
 namespace tessera::client::gles {
 
-// Reads: the two texels of a triangle record (scene_state.h), vertex positions, and three texels an object: the rows of
-// mesh space to metres relative to the eye. Writes: the corner's texel in the atlas, and what the whole triangle
-// shares.
-constexpr const char* kSceneVertex = R"(#version 300 es
+constexpr const char* kScenePrelude = R"(#version 300 es
 precision highp float;
 precision highp int;
+)";
+
+// After kScenePrelude and atlas::addressing::kGlslText. Reads: the two texels of a triangle record
+// (scene_state.h), vertex positions, and three texels an object: the rows of mesh space to metres relative to
+// the eye. Writes: the corner's texel in the atlas, and what the whole triangle shares.
+constexpr const char* kSceneVertex = R"(
 uniform highp usampler2D records;
 uniform highp sampler2D vertices;
 uniform highp sampler2D transforms;
@@ -20,35 +23,22 @@ flat out vec2 last;             // centre of the last texel of the block's colou
 flat out vec2 coverage_offset;  // from a texel to its coverage
 flat out vec4 single_color;     // a = 1: no block
 
-// Block coordinates by corner kind and corner (scene::patch_corner).
-const vec2 kCorners[18] = vec2[18](
-  vec2(0.0, 0.0), vec2(1.0, 0.0), vec2(0.0, 1.0),
-  vec2(0.0, 0.0), vec2(1.0, 0.0), vec2(0.0, 1.0),
-  vec2(1.0, 1.0), vec2(0.0, 1.0), vec2(1.0, 0.0),
-  vec2(0.0, 0.0), vec2(1.0, 0.0), vec2(0.5, 1.0),
-  vec2(0.0, 1.0), vec2(0.0, 0.0), vec2(0.5, 1.0),
-  vec2(1.0, 0.0), vec2(1.0, 1.0), vec2(0.5, 1.0));
-
 ivec2 table_texel(int i) { return ivec2(i & 2047, i >> 11); }
 
 void set_block(uvec4 shape, uint what, int corner) {
   origin = vec2(uvec2(shape.x, shape.x >> 16) & 0xffffu);
   ivec2 size = ivec2(uvec2(shape.y, shape.y >> 16) & 0xffffu);
   bool masked = (what >> 28 & 1u) != 0u;
-  ivec2 to_coverage = ivec2(0);
-  if (masked) {  // coverage lies beside the colour, or below it
-    to_coverage = size.x > size.y ? ivec2(size.x / 2, 0) : ivec2(0, size.y / 2);
-    size -= to_coverage;
-  }
-  vec2 position = kCorners[3 * int(what >> 24 & 7u) + corner];
+  int kind = int(what >> 24 & 7u);
+  int count = kind == 0 ? 1 : kind < 3 ? 2 : 3;
+  vec2 position = block_corner(count, kind - count * (count - 1) / 2, corner);
   if ((what >> 27 & 1u) != 0u) position = position.yx;
-  last = vec2(size) - 0.5;
-  // Half-texel inset; corners lie at texel centres, rounded (atlas/placement.h).
-  vec2 texel = floor(position * vec2(size - 1) + 0.5) + 0.5;
+  vec2 extent = vec2(block_color_size(size, masked) - 1);
+  last = extent + 0.5;
   // Interpolated on the surface, then divided: even on the screen of that eye (TSS eq. 5).
-  float distance = exp2(float(int(shape.z << (24 - 8 * corner)) >> 24) * (6.0 / 127.0));
-  spaced = distance * vec3(texel, 1.0);
-  coverage_offset = vec2(to_coverage);
+  int code = int(shape.z << (24 - 8 * corner)) >> 24;
+  spaced = ratio_from_code(code + kRatioCodeOne) * vec3(block_corner_texel(position, extent) + 0.5, 1.0);
+  coverage_offset = masked ? vec2(block_coverage_offset(size)) : vec2(0.0);
 }
 
 void main() {

@@ -67,8 +67,10 @@ IncludeGraph read_rooms(const std::filesystem::path& source_tree, const Rules& r
 }
 
 std::string room_of(const std::string& path, const Rules& rules) {
-  const std::string first = path.substr(0, path.find('/'));
-  return path.find('/') != std::string::npos && rules.contains(first) ? first : "";
+  for (size_t end = path.rfind('/'); end != std::string::npos && end > 0; end = path.rfind('/', end - 1)) {
+    if (const std::string folder = path.substr(0, end); rules.contains(folder)) return folder;
+  }
+  return "";
 }
 
 std::vector<std::string> forbidden_uses(const IncludeGraph& graph, const Rules& rules) {

@@ -22,7 +22,7 @@ Rules parse_rules(const std::string& rooms_cmake);
 IncludeGraph read_rooms(const std::filesystem::path& source_tree, const Rules& rules);
 std::string read_text(const std::filesystem::path& file);
 
-// The room of a path; empty if it is none's.
+// The room of a path, the innermost if one lies in another; empty if it is none's.
 std::string room_of(const std::string& path, const Rules& rules);
 // One line for each include of a room that the including room may not use, or by a path with "..".
 std::vector<std::string> forbidden_uses(const IncludeGraph& graph, const Rules& rules);

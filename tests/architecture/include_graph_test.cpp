@@ -54,6 +54,15 @@ TEST_F(SourceTree, ClientsDoNotReachVulkan) {
   }
 }
 
+// Its text is every shader's, the client's as well.
+TEST_F(SourceTree, AddressingUsesItselfAndGlmAlone) {
+  const std::string room = "atlas/addressing";
+  ASSERT_TRUE(graph_.contains(room + "/block.glsl"));
+  for (const std::string& include : reachable(graph_, {room})) {
+    EXPECT_TRUE(room_of(include, rules_) == room || include == "glm/glm.hpp") << include;
+  }
+}
+
 // It is also built to WebAssembly.
 TEST_F(SourceTree, GeometryCompressionUsesTheStandardLibraryAlone) {
   const std::string room = "geometry-compression/";
@@ -82,6 +91,16 @@ TEST(IncludeGraph, FindsForbiddenUses) {
                                    "high-top/a.h includes low/a.h"));
   EXPECT_THAT(reachable(graph, {"high-top/"}), UnorderedElementsAre("mid/a.h", "low/a.h", "lowest/x.h",
                                                                     "../high-top/a.h", "cstdint", "low/b.h"));
+}
+
+TEST(IncludeGraph, ARoomInARoomIsItsOwn) {
+  const Rules rules = parse_rules(
+      "set(TESSERA_ROOMS a a/b c)\nset(TESSERA_MAY_USE_a \"\")\nset(TESSERA_MAY_USE_a/b \"\")\n"
+      "set(TESSERA_MAY_USE_c a/b)\n");
+  const IncludeGraph graph{{"a/x.h", {"a/b/x.h"}}, {"a/b/x.h", {"a/x.h"}}, {"c/x.h", {"a/b/y/z.h", "a/x.h"}}};
+  EXPECT_THAT(
+      forbidden_uses(graph, rules),
+      UnorderedElementsAre("a/x.h includes a/b/x.h", "a/b/x.h includes a/x.h", "c/x.h includes a/x.h"));
 }
 
 TEST(IncludeGraph, ExpandsTheListOfAllRooms) {

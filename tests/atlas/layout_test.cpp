@@ -63,6 +63,7 @@ class LayoutTest : public testing::Test {
   uvec2 sides(scene::PatchId patch) const { return {placement(patch).width, placement(patch).height}; }
 
   std::unique_ptr<Layout> layout_;
+  LayoutSettings settings_;
 
  private:
   void apply(const LayoutDelta& delta) {
@@ -101,7 +102,6 @@ class LayoutTest : public testing::Test {
   }
 
   scene::Scene scene_;
-  LayoutSettings settings_;
   std::map<scene::PatchId, Placement> mirror_;
 };
 
@@ -306,7 +306,7 @@ TEST_F(CrowdedLayoutTest, ResetsMoveABoundedShareAFrame) {
       const auto old = before.find(p.patch);
       if (p.kind == PlacementKind::block && old != before.end() && old->second.kind == PlacementKind::block &&
           old->second != p) {
-        moved += uint64_t{old->second.width()} * old->second.height();
+        moved += uint64_t{old->second.width} * old->second.height;
       }
     }
     // Footprints stand still: what moves is the stage, and the few that the bias moves.

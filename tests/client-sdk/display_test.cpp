@@ -47,6 +47,41 @@ vec3 barycentric(const Triangle& t, vec2 p) {
   return {area(p, t[1], t[2]) / whole, area(t[0], p, t[2]) / whole, area(t[0], t[1], p) / whole};
 }
 
+// The inverse of how the server spaces samples: the texel is the mean of the corners', weighted by distance.
+TEST(Display, ReadsSpacedSamplesWhereTheyAre) {
+  auto display = make_display(kSide);
+  SceneBuilder scene;
+  std::vector<vec3> corners;
+  for (vec2 c : kPatchCorners[1]) corners.emplace_back(2 * c.x - 1, 2 * c.y - 1, -1);
+  scene.block(scene.patch(scene.object(), corners), 6, 10, 4, 4);
+  scene.meta().placements[0].width = 14;
+  scene.meta().placements[0].spacing = {21, -21, 63, 0};
+  const float distance[2][3] = {{1, 2, 0.5f}, {8, 0.5f, 2}};
+  const Image8 image = picture_of(*display, scene.state(), ramp_atlas(), square_view(kSide));
+  size_t checked = 0;
+  for (uint32_t y = 0; y < kSide; ++y) {
+    for (uint32_t x = 0; x < kSide; ++x) {
+      for (int t = 0; t < 2; ++t) {
+        const vec3 b = barycentric(kPatchTriangles[1][t], patch_position(x, y));
+        if (b.x < 0.02f || b.y < 0.02f || b.z < 0.02f) continue;
+        vec2 texel(0);
+        float sum = 0;
+        for (int i = 0; i < 3; ++i) {
+          const float weight = b[i] * distance[t][i];
+          texel += weight * corner_texel(kPatchTriangles[1][t][i], vec2(6, 10), vec2(14, 16), false);
+          sum += weight;
+        }
+        texel /= sum;
+        ++checked;
+        const Rgb expected{int(std::lround(8 * (texel.x - .5f))), int(std::lround(8 * (texel.y - .5f))), 0};
+        ASSERT_TRUE(near(pixel(image, x, y), expected, 2))
+            << " at " << x << "," << y << ": " << pixel(image, x, y) << " instead of " << expected;
+      }
+    }
+  }
+  EXPECT_GT(checked, kSide * kSide * 3 / 4);
+}
+
 // Every corner kind, both orientations, square, wide and high blocks: the picture's colours say where it
 // sampled.
 TEST(Display, SamplesWhereThePlacementSays) {

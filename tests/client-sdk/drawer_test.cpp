@@ -126,7 +126,7 @@ TEST_F(DrawerTest, AnErrorOfTheAppsIsNamedAsTheApps) {
 class UglyState {
  public:
   UglyState() : framebuffer_(8, 8), texture_(gles::make_texture()), array_(gles::make_vertex_array()) {
-    program_ = *gles::make_program("#version 300 es\nvoid main() { gl_Position = vec4(0.0); }",
+    program_ = *gles::make_program({"#version 300 es\nvoid main() { gl_Position = vec4(0.0); }"},
                                    {"#version 300 es\nvoid main() {}"});
     glGenSamplers(1, &sampler_);
     glSamplerParameteri(sampler_, GL_TEXTURE_MAG_FILTER, GL_NEAREST);

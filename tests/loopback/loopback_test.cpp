@@ -46,6 +46,16 @@ TEST(Loopback, TheClientShowsWhatTheServerMeant) {
   EXPECT_LE(row.mbps_total, 10 * 1.3);
 }
 
+TEST(Loopback, EveryLayoutShowsTheScene) {
+  for (const atlas::LayoutKind layout : {atlas::LayoutKind::blocks, atlas::LayoutKind::coherent}) {
+    LoopbackSettings s = small(0.2);
+    s.layout = layout;
+    const LoopbackResult result = run(s);
+    EXPECT_EQ(result.rows.at(0).violations, 0u);
+    EXPECT_GT(result.rows[0].error.mssim, 0.8);
+  }
+}
+
 TEST(Loopback, SplitAddsUpAndEachCauseOnlyRemovesError) {
   const LoopbackResult result = run(small(0.3));
   ASSERT_EQ(result.split.size(), 5u);

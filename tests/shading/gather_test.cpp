@@ -87,6 +87,51 @@ TEST_P(BothPaths, EveryTexelOfATwoTrianglePatchIsLinear) {
   }
 }
 
+// TSS eq. 5: even on the screen of the eye that the codes stand for, so on the surface weights go by 1 / distance.
+TEST_P(BothPaths, SpacedSamplesAreEvenOnTheirEyesScreen) {
+  for (uint32_t triangles = 1; triangles <= 3; ++triangles) {
+    SceneBuilder b;
+    b.instance(b.patch(triangles), b.material(coordinates()));
+    const World world = make_world(b.build());
+    Placement p = block(0, 0, 0, 5, 5);
+    p.width = 30;  // sides need not be powers of two
+    p.spacing = {21, -10, 30, 5};
+    const GatherResult r = gather(world, {0.5, 0.5, 2}, {&p, 1}, settings());
+    // Distances by patch corner, and the patch's corners of each triangle (scene::Patch).
+    const double distance[] = {1, 2, std::exp2(-10 / 21.0), std::exp2(30 / 21.0), std::exp2(5 / 21.0)};
+    const int corners[3][3][3] = {{{0, 1, 2}}, {{0, 1, 2}, {3, 2, 1}}, {{0, 1, 2}, {3, 0, 2}, {1, 4, 2}}};
+    size_t checked = 0;
+    for (uint32_t t = 0; t < triangles; ++t) {
+      dvec2 at[3], shown[3];
+      for (uint32_t c = 0; c < 3; ++c) {
+        shown[c] = scene::patch_corner(triangles, t, c);
+        at[c] = glm::floor(shown[c] * dvec2(29, 31) + 0.5);
+      }
+      const dvec2 e1 = at[1] - at[0], e2 = at[2] - at[0];
+      const double det = e1.x * e2.y - e1.y * e2.x;
+      for (uint32_t y = 0; y < 32; ++y)
+        for (uint32_t x = 0; x < 30; ++x) {
+          const dvec2 d = dvec2(x, y) - at[0];
+          const double s1 = (d.x * e2.y - d.y * e2.x) / det, s2 = (e1.x * d.y - e1.y * d.x) / det;
+          const double s[] = {1 - s1 - s2, s1, s2};
+          if (std::min({s[0], s[1], s[2]}) < 0.01) continue;
+          dvec2 expected(0);
+          double sum = 0;
+          for (int c = 0; c < 3; ++c) {
+            const double weight = s[c] / distance[corners[triangles - 1][t][c]];
+            expected += weight * shown[c];
+            sum += weight;
+          }
+          expected /= sum;
+          ++checked;
+          EXPECT_NEAR(linear(r.atlas.at(x, y)[0]), expected.x, 0.01) << triangles << " at " << x << "," << y;
+          EXPECT_NEAR(linear(r.atlas.at(x, y)[1]), expected.y, 0.01) << triangles << " at " << x << "," << y;
+        }
+    }
+    EXPECT_GT(checked, 300u);
+  }
+}
+
 TEST_P(BothPaths, ALoneTriangleRepeatsItsEdge) {
   SceneBuilder b;
   b.instance(b.patch(1), b.material(coordinates()));

@@ -1,0 +1,43 @@
+// How many vertices, and so samples, the tessellator makes of a triangle (TSS section 3.1): equal spacing, levels 1..64.
+#ifndef TESSERA_ADDRESSING_TESSELLATION_GLSL
+#define TESSERA_ADDRESSING_TESSELLATION_GLSL
+
+#include "atlas/addressing/language.glsl"
+
+const int kMaxTessellationLevel = 64;
+const int kMaxTessellationVertices = 3169;
+
+// TSS eq. 1: all four levels at `level` <= 64. 0 for levels below 0, which stands for a ring that is not there.
+INLINE int tessellation_vertices(int level) {
+  if (level < 0) return 0;
+  int rings = level / 2;
+  return 3 * (rings + 1) * (rings + level % 2) + (level + 1) % 2;
+}
+
+// Of the edges that lie opposite corner 0, 1 and 2, and of the inside.
+struct TessellationLevels {
+  ivec3 outer;
+  int inner;
+};
+
+// The smallest levels that make exactly `count` vertices, 3 <= count <= 3169, their outer levels as even as can be. Stands in
+// for TSS-supp eqs. 2-6, which as printed give another count almost always. No outer level is 0: that would cull the triangle.
+INLINE TessellationLevels tessellation_levels(int count) {
+  TessellationLevels levels;
+  levels.outer = ivec3(1);
+  levels.inner = 1;
+  if (count <= 3) return levels;
+  // Eq. 1 is 3/4 (level + 1)^2, rounded up: the smallest level that reaches `count`, set right where the root was rounded.
+  int inner = int(sqrt(float(count - 1) * (4.0f / 3.0f)));
+  if (tessellation_vertices(inner) < count) ++inner;
+  if (tessellation_vertices(inner - 1) >= count) --inner;
+  levels.inner = max(inner, 2);
+  // The rings inside the outer one are those of two levels less.
+  int outer = count - tessellation_vertices(levels.inner - 2);
+  int first = (outer + 2) / 3;
+  int second = (outer - first + 1) / 2;
+  levels.outer = ivec3(first, second, outer - first - second);
+  return levels;
+}
+
+#endif
