@@ -26,7 +26,7 @@ using SpacingCode = int8_t;
 // a triangle samples are evenly spaced on the surface if its spacing codes are equal, else as seen by the eye
 // that the codes stand for (TSS eq. 5). A masked patch's block is split in halves: left and right if it is
 // wider than high, else upper and lower. Colour lies in the first half, coverage as grey in the second; the
-// map above then holds for the colour half.
+// map above then holds for the colour half. As code: atlas/addressing/block.glsl.
 struct Placement {
   scene::PatchId patch = scene::kNone;
   PlacementKind kind = PlacementKind::color;

@@ -62,7 +62,7 @@ INLINE LTexels l_texels(vec3 lambda, int level) {
   int c = int(column);
   bool on_edge = tips.least == 0;
   if (level % 2 == 0) {
-    if (2 * c == level && k < c && on_edge) {
+    if (2 * c == level && on_edge) {
       at.texel = ivec2(c, level - k);
       at.copy = ivec2(level - k, c);
     }

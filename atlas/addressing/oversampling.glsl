@@ -56,12 +56,9 @@ INLINE ivec2 staircase_position(int id, ivec2 size) {
   if (id <= size.x) return ivec2(id, 0);
   int below = id - (size.x + 1);
   int stretch = staircase_stretch(size);
+  // Where rounding takes the first sample of a stretch for the one after the last of the stretch above, that is the same place.
   float a = float(2 * size.x + 3);
-  float root = sqrt(max(a * a - 8.0f * float(below) / float(stretch), 0.0f));
-  int stretches = max(int(0.5f * (a - root)), 0);
-  // The root was rounded.
-  if (staircase_before(stretches, size) > below) --stretches;
-  if (staircase_before(stretches + 1, size) <= below) ++stretches;
+  int stretches = int(0.5f * (a - sqrt(a * a - 8.0f * float(below) / float(stretch))));
   int in_stretch = below - staircase_before(stretches, size);
   int length = size.x + 1 - stretches;
   return ivec2(in_stretch % length, in_stretch / length + stretch * stretches + 1);

@@ -27,11 +27,9 @@ INLINE TessellationLevels tessellation_levels(int count) {
   levels.outer = ivec3(1);
   levels.inner = 1;
   if (count <= 3) return levels;
-  // Eq. 1 is 3/4 (level + 1)^2, rounded up: the smallest level that reaches `count`, set right where the root was rounded.
-  int inner = int(sqrt(float(count - 1) * (4.0f / 3.0f)));
-  if (tessellation_vertices(inner) < count) ++inner;
-  if (tessellation_vertices(inner - 1) >= count) --inner;
-  levels.inner = max(inner, 2);
+  // Eq. 1 is 3/4 (level + 1)^2, rounded up, so the level is the root of 4/3 (count - 1), rounded down. That is whole or at least
+  // a third away; adding a sixth keeps rounding from mattering.
+  levels.inner = max(int(sqrt(float(8 * count - 7) / 6.0f)), 2);
   // The rings inside the outer one are those of two levels less.
   int outer = count - tessellation_vertices(levels.inner - 2);
   int first = (outer + 2) / 3;
