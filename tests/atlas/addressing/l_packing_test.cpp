@@ -56,7 +56,6 @@ TEST(LPacking, SamplesFillTheLAsTheTessellatorGivesThem) {
       const std::vector<vec3> given = perturbed(exact, level, seed);
       expect_exact_cover(given, level);
       for (size_t i = 0; i < exact.size(); ++i) {
-        // On the cut of even levels either texel may be the first; elsewhere an error moves none.
         const LTexels a = l_texels(exact[i], level), b = l_texels(given[i], level);
         ASSERT_TRUE(a.texel == b.texel && a.copy == b.copy) << level;
       }
