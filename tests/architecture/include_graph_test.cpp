@@ -28,7 +28,8 @@ TEST_F(SourceTree, WasRead) {
   EXPECT_FALSE(rules_.at("atlas").contains("shading"));
   EXPECT_TRUE(rules_.at("bench").contains("server"));
   ASSERT_TRUE(graph_.contains("atlas/placement.h"));
-  EXPECT_THAT(graph_.at("atlas/placement.h"), ElementsAre("cstdint", "vector", "scene/scene.h"));
+  EXPECT_THAT(graph_.at("atlas/placement.h"),
+              ElementsAre("array", "cstdint", "span", "vector", "scene/scene.h"));
 }
 
 TEST_F(SourceTree, RoomsUseOnlyTheRoomsThatTheyMay) {
