@@ -42,7 +42,7 @@ struct Layout::Impl {
   void count(const LayoutDelta& delta);
   void plan_next_frame();
   void free(const Placement& p) {
-    if (p.kind == PlacementKind::block) slabs.free({p.x, p.y}, p.height);
+    if (p.kind == PlacementKind::block) slabs.free({p.x, p.y}, p.width, p.height);
   }
 
   const scene::Scene& scene;

@@ -48,7 +48,6 @@ std::optional<uvec2> Slabs::take(uint32_t index, uint32_t rows) {
   if (at < 0) return std::nullopt;
   slab.free_rows &= ~(low_bits(rows) << at);
   slab.used = static_cast<uint16_t>(slab.used + rows);
-  used_texels_ += uint64_t{rows} * slab.width * kUnit * kUnit;
   return uvec2(slab.x * kUnit, slab.shelf * kShelfHeight + static_cast<uint32_t>(at) * kUnit);
 }
 
@@ -63,11 +62,16 @@ std::optional<uvec2> Slabs::take_from_width(uint32_t width, uint32_t rows) {
 
 std::optional<uvec2> Slabs::allocate(uint32_t width, uint32_t height) {
   assert(width >= kUnit && width <= kShelfHeight && height >= kUnit && height <= kShelfHeight);
-  const uint32_t units = width / kUnit, rows = height / kUnit;
-  if (const auto at = take_from_width(units, rows)) return at;
-  if (const auto slab = draw_slab(units, rows)) return take(*slab, rows);
+  const auto at = find(width / kUnit, height / kUnit);
+  if (at) used_texels_ += uint64_t{width} * height;
+  return at;
+}
+
+std::optional<uvec2> Slabs::find(uint32_t width, uint32_t rows) {
+  if (const auto at = take_from_width(width, rows)) return at;
+  if (const auto slab = draw_slab(width, rows)) return take(*slab, rows);
   // Better a little too wide than none.
-  for (uint32_t wider = units + 1; wider <= std::min(2 * units, kShelfHeight / kUnit); ++wider) {
+  for (uint32_t wider = width + 1; wider <= std::min(2 * width - 1, kShelfHeight / kUnit); ++wider) {
     if (const auto at = take_from_width(wider, rows)) return at;
   }
   return std::nullopt;
@@ -99,14 +103,14 @@ std::optional<uint32_t> Slabs::draw_slab(uint32_t width, uint32_t rows) {
   return std::nullopt;
 }
 
-void Slabs::free(uvec2 at, uint32_t height) {
+void Slabs::free(uvec2 at, uint32_t width, uint32_t height) {
   const uint32_t index = index_at(at), rows = height / kUnit;
   Slab& slab = slabs_[index];
   const Bits freed = low_bits(rows) << (at.y % kShelfHeight / kUnit);
   assert((slab.free_rows & freed) == 0);
   slab.free_rows |= freed;
   slab.used = static_cast<uint16_t>(slab.used - rows);
-  used_texels_ -= uint64_t{rows} * slab.width * kUnit * kUnit;
+  used_texels_ -= uint64_t{width} * height;
   if (slab.used == 0) release(index);
 }
 

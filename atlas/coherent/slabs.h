@@ -35,8 +35,8 @@ class Slabs {
   // Upper left texel of a free rectangle, or nothing if there is no room. Sides: even, 2..kShelfHeight. First
   // fit, in the slabs of its width, in a new slab, or in the narrowest wider one that has room.
   std::optional<uvec2> allocate(uint32_t width, uint32_t height);
-  // Gives back what allocate() returned for this height.
-  void free(uvec2 at, uint32_t height);
+  // Gives back what allocate() returned for these sides.
+  void free(uvec2 at, uint32_t width, uint32_t height);
 
   // Closes the emptiest slabs to allocate(), together holding at most `budget_texels` in rectangles: once
   // these are freed and placed elsewhere, the slabs return to the shelves. Slabs above `fullest` (share in
@@ -68,6 +68,7 @@ class Slabs {
 
   const Slab& slab_at(uvec2 at) const { return slabs_[index_at(at)]; }
   uint32_t index_at(uvec2 at) const { return shelves_[at.y / kShelfHeight].slab_of_x[at.x / kUnit]; }
+  std::optional<uvec2> find(uint32_t width, uint32_t rows);
   std::optional<uvec2> take(uint32_t slab, uint32_t rows);
   std::optional<uvec2> take_from_width(uint32_t width, uint32_t rows);
   std::optional<uint32_t> draw_slab(uint32_t width, uint32_t rows);

@@ -32,7 +32,7 @@ TEST(Slabs, RandomUseNeverOverlaps) {
     for (int frame = 0; frame < 60; ++frame) {
       for (size_t i = rects.size() / 4; i > 0; --i) {
         std::swap(rects[random() % rects.size()], rects.back());
-        slabs.free(rects.back().at, rects.back().size.y);
+        slabs.free(rects.back().at, rects.back().size.x, rects.back().size.y);
         rects.pop_back();
       }
       for (int i = 0; i < 200; ++i) {
@@ -42,7 +42,7 @@ TEST(Slabs, RandomUseNeverOverlaps) {
       check(slabs, rects, width, height);
     }
     EXPECT_GT(static_cast<double>(slabs.stats().used_texels), 0.5 * width * height);
-    for (const Rect& r : rects) slabs.free(r.at, r.size.y);
+    for (const Rect& r : rects) slabs.free(r.at, r.size.x, r.size.y);
     EXPECT_EQ(slabs.stats().slab_texels, 0u) << "an emptied atlas serves every width again";
   }
 }
@@ -55,7 +55,7 @@ TEST(Slabs, ExactlyFullThenOneTooMany) {
   check(slabs, rects, 256, 256);
   EXPECT_EQ(slabs.free_share(), 0);
   EXPECT_FALSE(slabs.allocate(2, 2).has_value());
-  slabs.free(rects[100].at, 8);
+  slabs.free(rects[100].at, 16, 8);
   EXPECT_EQ(slabs.allocate(16, 8), rects[100].at);
 }
 
@@ -63,9 +63,9 @@ TEST(Slabs, FreedNeighboursServeAHigherRectangle) {
   Slabs slabs(16, 256);
   std::vector<uvec2> at;
   for (int i = 0; i < 32; ++i) at.push_back(*slabs.allocate(16, 8));
-  slabs.free(at[10], 8);
+  slabs.free(at[10], 16, 8);
   EXPECT_FALSE(slabs.allocate(16, 16).has_value());
-  slabs.free(at[11], 8);
+  slabs.free(at[11], 16, 8);
   EXPECT_EQ(slabs.allocate(16, 16), at[10]);
 }
 
@@ -76,8 +76,8 @@ TEST(Slabs, ANarrowRectangleTakesAWiderSlabBeforeItGoesWithout) {
   ASSERT_TRUE(at.has_value());
   EXPECT_EQ(*at, uvec2(0, 200));
   EXPECT_FALSE(slabs.allocate(4, 4).has_value()) << "not one that is twice as wide";
-  slabs.free({0, 0}, 200);
-  slabs.free(*at, 50);
+  slabs.free({0, 0}, 24, 200);
+  slabs.free(*at, 16, 50);
   EXPECT_EQ(slabs.stats().used_texels, 0u);
 }
 
@@ -92,7 +92,7 @@ TEST(Slabs, ClosedSlabsAreTheEmptiestAndTakeNothing) {
   EXPECT_TRUE(slabs.closed(half));
   EXPECT_FALSE(slabs.closed(full)) << "fuller than asked for";
   EXPECT_FALSE(slabs.allocate(32, 8).has_value());
-  slabs.free(half, 128);
+  slabs.free(half, 32, 128);
   EXPECT_TRUE(slabs.allocate(32, 8).has_value()) << "an emptied slab returns to its shelf";
   slabs.reopen();
   EXPECT_FALSE(slabs.closed(sparse));

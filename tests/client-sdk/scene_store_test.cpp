@@ -116,9 +116,10 @@ class NaiveModel {
   std::map<uint32_t, PatchPlacement> placed_;
 };
 
-std::vector<std::array<uint32_t, 4>> sorted(const std::vector<TriangleRecord>& records) {
-  std::vector<std::array<uint32_t, 4>> out;
-  for (const auto& r : records) out.push_back({r.a, r.b, r.c, r.d});
+std::vector<std::pair<std::array<uint32_t, 4>, std::array<uint32_t, 4>>> sorted(
+    const std::vector<TriangleRecord>& records) {
+  std::vector<std::pair<std::array<uint32_t, 4>, std::array<uint32_t, 4>>> out;
+  for (const auto& r : records) out.emplace_back(r.vertices, r.shape);
   std::sort(out.begin(), out.end());
   return out;
 }
