@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 
-#include "atlas/blocks/allocator.h"
 #include "atlas/blocks/staged_reset.h"
 
 namespace tessera::atlas::blocks {
@@ -68,11 +67,12 @@ LayoutSettings settings_for(uint32_t width, uint32_t height) {
 }
 
 struct Layout::Impl {
-  Impl(const scene::Scene& scene, const LayoutSettings& s)
+  Impl(const scene::Scene& scene, const LayoutSettings& s, Strategy strategy)
       : settings(s),
+        may_reset(strategy < Strategy::no_resets),
         traits(scene),
         superblocks((s.width >> s.superblock_log) * (s.height >> s.superblock_log)),
-        allocator(s.superblock_log, superblocks),
+        allocator(s.superblock_log, superblocks, strategy),
         reset(superblocks),
         target(static_cast<double>(s.width) * s.height) {
     settings.levels.max_log = std::min(settings.levels.max_log, settings.superblock_log);
@@ -95,6 +95,7 @@ struct Layout::Impl {
   }
 
   LayoutSettings settings;
+  bool may_reset;
   PatchTraitTable traits;
   uint32_t superblocks;
   Allocator allocator;
@@ -262,9 +263,9 @@ void Layout::Impl::plan_next_frame() {
       1 - static_cast<float>(memory.free_superblocks) / static_cast<float>(superblocks);
   const bool starved = stats.colors_out_of_memory > 0;
   const bool above_mark = share_in_use > settings.high_water;
-  const bool fragmented = memory.stack_texels >= memory.capacity_texels / superblocks;
-  const uint64_t spare_texels =
-      memory.carry_texels + memory.free_superblocks * (memory.capacity_texels / superblocks);
+  const bool fragmented =
+      memory.stack_texels + memory.inaccessible_texels >= memory.capacity_texels / superblocks;
+  const uint64_t spare_texels = memory.carry_texels + memory.free_texels;
   memory_short = starved || static_cast<float>(spare_texels) <
                                 (1 - settings.high_water) * static_cast<float>(memory.capacity_texels);
   ++frames_since_reset;
@@ -272,7 +273,7 @@ void Layout::Impl::plan_next_frame() {
     if (!starved && share_in_use < kRelief * settings.high_water) reset.stop();
     if (!starved) pause_frames = kPauseFrames;
     frames_since_reset = 0;
-  } else if ((starved || (above_mark && fragmented)) && frames_since_reset >= pause_frames) {
+  } else if (may_reset && (starved || (above_mark && fragmented)) && frames_since_reset >= pause_frames) {
     reset.start(allocator.used_texels());
     if (starved) target.on_out_of_memory();  // fragmentation alone is cured by the reset
     ++stats.resets_total;
@@ -282,9 +283,10 @@ void Layout::Impl::plan_next_frame() {
   }
 }
 
-StatusOr<std::unique_ptr<Layout>> Layout::create(const scene::Scene& scene, const LayoutSettings& settings) {
+StatusOr<std::unique_ptr<Layout>> Layout::create(const scene::Scene& scene, const LayoutSettings& settings,
+                                                 Strategy strategy) {
   TESSERA_RETURN_IF_ERROR(check(settings));
-  return std::unique_ptr<Layout>(new Layout(std::make_unique<Impl>(scene, settings)));
+  return std::unique_ptr<Layout>(new Layout(std::make_unique<Impl>(scene, settings, strategy)));
 }
 
 Layout::Layout(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -297,6 +299,9 @@ std::span<const Placement> Layout::placements() const {
 }
 const LayoutStats& Layout::stats() const {
   return impl_->stats;
+}
+AllocatorStats Layout::memory() const {
+  return impl_->allocator.stats();
 }
 
 }  // namespace tessera::atlas::blocks
