@@ -65,6 +65,12 @@ layout(push_constant) uniform Push {
   uint superblock_count;
 };
 
+// Beyond the last: one that asks for nothing.
+Request request_at(uint index) {
+  if (index < request_count) return requests[index];
+  return Request(kNoBlock, 0);
+}
+
 uint log_w_of(uint level) {
   return level & 15u;
 }
@@ -85,6 +91,12 @@ uint freed_level(Request r) {
 }
 uint allocated_level(Request r) {
   return r.levels >> 8;
+}
+uint free_key(Request r) {
+  return level_index(freed_level(r));
+}
+uint allocate_key(Request r) {
+  return kLevels + level_index(allocated_level(r));
 }
 
 int blocks_per_superblock(uint log_w, uint log_h) {
