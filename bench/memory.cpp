@@ -38,6 +38,8 @@ json to_json(const StrategyRow& row) {
           {"free", row.free},
           {"out_of_memory_frames", row.out_of_memory_frames},
           {"out_of_memory_patches", row.out_of_memory_patches},
+          {"halved_frames", row.halved_frames},
+          {"halved_patches", row.halved_patches},
           {"resets", row.resets},
           {"reset_frames", row.reset_frames},
           {"bias", row.bias},
@@ -64,14 +66,14 @@ std::string speed_text(const std::vector<SpeedRow>& rows) {
 
 std::string strategies_text(const std::vector<StrategyRow>& rows) {
   std::string text =
-      absl::StrFormat("%-9s %7s %8s %7s %13s %7s %14s %7s %6s\n", "strategy", "used", "carried", "stacks",
-                      "inaccessible", "free", "out of memory", "resets", "bias");
+      absl::StrFormat("%-9s %7s %8s %7s %13s %7s %14s %7s %7s %6s\n", "strategy", "used", "carried", "stacks",
+                      "inaccessible", "free", "out of memory", "halved", "resets", "bias");
   const auto share = [](double value) { return absl::StrFormat("%.1f%%", 100 * value); };
   for (const StrategyRow& row : rows) {
-    absl::StrAppendFormat(&text, "%-9s %7s %8s %7s %13s %7s %14s %7d %6.2f\n", name_of(row.strategy),
+    absl::StrAppendFormat(&text, "%-9s %7s %8s %7s %13s %7s %14s %7d %7d %6.2f\n", name_of(row.strategy),
                           share(row.used), share(row.carried), share(row.stacks), share(row.inaccessible),
                           share(row.free), absl::StrCat(row.out_of_memory_frames, " of ", row.frames),
-                          row.resets, row.bias);
+                          row.halved_frames, row.resets, row.bias);
   }
   return text;
 }

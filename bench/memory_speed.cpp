@@ -11,12 +11,12 @@
 namespace tessera::bench {
 namespace {
 
+using atlas::LayoutSettings;
 using atlas::Level;
 using atlas::blocks::Allocator;
 using atlas::blocks::BlockAddress;
 using atlas::blocks::GpuAllocator;
 using atlas::blocks::GpuRequest;
-using atlas::blocks::LayoutSettings;
 using atlas::blocks::Request;
 
 constexpr double kFill = 0.7;    // of the atlas, by the visible patches
@@ -226,7 +226,7 @@ StatusOr<SpeedRow> measure_row(gpu::Device& device, uint32_t patches, const Spee
     TESSERA_ASSIGN_OR_RETURN(const double gpu_ms, gpu->update(cpu));
     const scene::VisiblePatches visible = crowd.visible();
     const TimeNs begin = clock.now();
-    layout->update(visible);
+    layout->update({.visible = visible});
     const TimeNs end = clock.now();
     row.differing_blocks += gpu->count_differing(cpu);
     for (size_t i = 0; i < cpu.requests().size(); ++i)

@@ -15,22 +15,28 @@ namespace tessera::bench {
 namespace {
 
 using atlas::blocks::Layout;
-using atlas::blocks::LayoutStats;
 using atlas::blocks::Strategy;
 
 constexpr std::array kStrategies{Strategy::reference, Strategy::no_columns, Strategy::no_stacks,
                                  Strategy::no_resets};
 
 // Sums until finish().
-void add(const LayoutStats& stats, double capacity, StrategyRow& row) {
+void add(const Layout& layout, StrategyRow& row) {
+  const atlas::LayoutStats& stats = layout.stats();
+  const atlas::blocks::AllocatorStats memory = layout.memory();
+  const auto share = [&memory](uint64_t texels) {
+    return static_cast<double>(texels) / static_cast<double>(memory.capacity_texels);
+  };
   ++row.frames;
-  row.used += static_cast<double>(stats.used_texels) / capacity;
-  row.carried += static_cast<double>(stats.carry_texels) / capacity;
-  row.stacks += static_cast<double>(stats.stack_texels) / capacity;
-  row.inaccessible += static_cast<double>(stats.inaccessible_texels) / capacity;
-  row.free += static_cast<double>(stats.free_texels) / capacity;
+  row.used += share(memory.used_texels);
+  row.carried += share(memory.carry_texels);
+  row.stacks += share(memory.stack_texels);
+  row.inaccessible += share(memory.inaccessible_texels);
+  row.free += share(memory.free_texels);
   row.out_of_memory_frames += stats.colors_out_of_memory > 0;
   row.out_of_memory_patches += stats.colors_out_of_memory;
+  row.halved_frames += stats.blocks_halved > 0;
+  row.halved_patches += stats.blocks_halved;
   row.resets = stats.resets_total;
   row.reset_frames += stats.reset;
   row.bias += stats.bias;
@@ -40,7 +46,7 @@ void add(const LayoutStats& stats, double capacity, StrategyRow& row) {
 
 void finish(StrategyRow& row) {
   for (double* sum : {&row.used, &row.carried, &row.stacks, &row.inaccessible, &row.free,
-                      &row.out_of_memory_patches, &row.bias, &row.blocks, &row.colors}) {
+                      &row.out_of_memory_patches, &row.halved_patches, &row.bias, &row.blocks, &row.colors}) {
     *sum /= std::max(1u, row.frames);
   }
 }
@@ -61,14 +67,12 @@ StatusOr<std::vector<StrategyRow>> compare_strategies(gpu::Device& device, const
   TESSERA_ASSIGN_OR_RETURN(const auto instant, scene::SceneInstant::create(device, *gpu_scene));
   TESSERA_ASSIGN_OR_RETURN(const auto visibility, pvs::Visibility::create(device, *gpu_scene, {}));
 
-  atlas::blocks::LayoutSettings layout_settings =
+  const atlas::LayoutSettings layout_settings =
       atlas::blocks::settings_for(settings.atlas.width, settings.atlas.height);
-  const double capacity = static_cast<double>(settings.atlas.width) * settings.atlas.height;
   std::vector<StrategyRow> rows;
   std::vector<std::unique_ptr<Layout>> layouts;
   for (const Strategy strategy : kStrategies) {
-    layout_settings.strategy = strategy;
-    TESSERA_ASSIGN_OR_RETURN(auto layout, Layout::create(*scene, layout_settings));
+    TESSERA_ASSIGN_OR_RETURN(auto layout, Layout::create(*scene, layout_settings, strategy));
     layouts.push_back(std::move(layout));
     rows.push_back({.strategy = strategy});
   }
@@ -82,8 +86,8 @@ StatusOr<std::vector<StrategyRow>> compare_strategies(gpu::Device& device, const
                              visibility->determine(*instant, from.views, client_view(settings)));
     const scene::VisiblePatches visible = retention.update(from.newest.time_ns, seen);
     for (size_t s = 0; s < layouts.size(); ++s) {
-      layouts[s]->update(visible);
-      add(layouts[s]->stats(), capacity, rows[s]);
+      layouts[s]->update({.visible = visible});
+      add(*layouts[s], rows[s]);
     }
     progress.advance();
   }

@@ -25,6 +25,8 @@ struct StrategyRow {
   double free = 0;                        // in free superblocks
   uint32_t out_of_memory_frames = 0;      // with a patch that found no block
   double out_of_memory_patches = 0;       // a frame
+  uint32_t halved_frames = 0;             // with a patch that took a smaller block instead
+  double halved_patches = 0;              // a frame
   uint32_t resets = 0, reset_frames = 0;  // started; in which a stage of one moved patches
   double bias = 0, blocks = 0, colors = 0;
 };
