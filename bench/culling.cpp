@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/camera_path.h"
+#include "bench/path_views.h"
 #include "bench/streamer.h"
-#include "pvs/prediction.h"
 #include "pvs/visibility.h"
 #include "scene/gltf.h"
 #include "scene/procedural.h"
@@ -15,24 +15,12 @@
 namespace tessera::bench {
 namespace {
 
-constexpr DurationNs kHistoryNs = kNsPerSecond / 4;
-
 // Patches in only one of the two. What both see has the same footprint: it depends on the eye alone.
 size_t count_differing(const scene::VisiblePatches& a, const scene::VisiblePatches& b) {
   std::vector<scene::VisiblePatch> differing;
   std::ranges::set_symmetric_difference(a, b, std::back_inserter(differing), {}, &scene::VisiblePatch::patch,
                                         &scene::VisiblePatch::patch);
   return differing.size();
-}
-
-// The poses that a server has at `now_s` on the path.
-std::vector<TimedPose> history_at(const CameraPath& path, double now_s, double fps) {
-  std::vector<TimedPose> poses;
-  const TimeNs now = from_seconds(now_s);
-  for (TimeNs t = std::max<TimeNs>(0, now - kHistoryNs); t < now; t += from_seconds(1 / fps))
-    poses.push_back({t, path.at(t)});
-  poses.push_back({now, path.at(now)});
-  return poses;
 }
 
 struct Study {
@@ -45,14 +33,10 @@ struct Study {
 };
 
 StatusOr<CullingFrame> Study::measure(double path_s) const {
-  const std::vector<TimedPose> poses = history_at(path, path_s, settings.fps);
-  pvs::PredictionSettings prediction;
-  prediction.mode =
-      settings.pvs == Prediction::none ? pvs::PredictionMode::none : pvs::PredictionMode::linear;
-  prediction.horizon_ns = from_ms(2 * settings.delay_ms) + 2 * from_seconds(1 / settings.server_fps);
+  const PathViews seen_from = path_views(settings, path, path_s);
+  const std::vector<View>& views = seen_from.views;
   const View client = client_view(settings);
-  const std::vector<View> views = pvs::predict_views(poses, poses.back().time_ns, client, prediction);
-  instant->set(poses.back().time_ns, poses.back().pose.position);
+  instant->set(seen_from.newest.time_ns, seen_from.newest.pose.position);
 
   CullingFrame frame{.path_s = path_s};
   TESSERA_ASSIGN_OR_RETURN(const scene::VisiblePatches seen, culled->determine(*instant, views, client));

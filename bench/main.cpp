@@ -11,6 +11,7 @@
 #include "bench/culling.h"
 #include "bench/file_io.h"
 #include "bench/loopback.h"
+#include "bench/memory.h"
 #include "bench/report.h"
 #include "bench/version.h"
 
@@ -22,7 +23,7 @@ enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
 constexpr char kFooter[] =
     R"(Configuration: every option is also an environment variable (--delay-ms = TESSERA_BENCH_DELAY_MS) and a key
-of the --config file, under [loopback] or [culling]. Flags win over the file, the file over the environment.
+of the --config file, under [loopback], [culling] or [memory]. Flags win over the file, the file over the environment.
 
 Exit codes: 0 done, 1 the run failed, 2 wrong usage.)";
 
@@ -42,7 +43,13 @@ int report_failure(const Status& status) {
 constexpr char kCullingFooter[] = R"(Example:
   tessera-bench culling --scene viking_village.glb --path viking_village_1.csv --seconds 1)";
 
-std::string command_line(std::string command, const bench::LoopbackSettings& settings) {
+constexpr char kMemoryFooter[] = R"(Examples:
+  tessera-bench memory --frames 0 --json speed.json
+  tessera-bench memory --patches 0 --scene sponza.glb --path sponza_1.csv --server-fps 60
+  tessera-bench memory --patches 0 --scene robot_lab.glb --path robot_lab_3.csv --atlas 2048x1024 --json lab.json)";
+
+template <class Settings>
+std::string command_line(std::string command, const Settings& settings) {
   for (const std::string& flag : bench::to_flags(settings)) command += " " + flag;
   return command;
 }
@@ -127,6 +134,18 @@ int run_culling(const bench::LoopbackSettings& settings) {
   return written.ok() ? kOk : report_failure(written);
 }
 
+int run_memory(const bench::MemorySettings& settings) {
+  const SteadyClock clock;
+  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
+  StatusOr<bench::MemoryResult> result = bench::run_memory(settings, progress);
+  if (!result.ok()) return report_failure(result.status());
+  result->command = command_line("tessera-bench memory", settings);
+  std::cout << bench::to_text(*result) << std::flush;
+  if (settings.shared.json.empty()) return kOk;
+  const Status written = bench::write_file(settings.shared.json, bench::to_json(*result).dump(1) + "\n");
+  return written.ok() ? kOk : report_failure(written);
+}
+
 int run_report(const std::string& folder) {
   const Status written = bench::write_report(folder);
   if (!written.ok()) return report_failure(written);
@@ -160,6 +179,12 @@ int main(int argc, char** argv) {
   culling->footer(kCullingFooter);
   culling->fallthrough();
 
+  CLI::App* memory = app.add_subcommand("memory", "atlas memory: time, and where its texels are by strategy");
+  bench::MemorySettings memory_settings;
+  bench::add_options(*memory, memory_settings);
+  memory->footer(kMemoryFooter);
+  memory->fallthrough();
+
   CLI::App* report = app.add_subcommand("report", "one page from all runs in a folder");
   std::string folder;
   report->add_option("folder", folder, "where `loopback --report` left its runs")
@@ -174,5 +199,6 @@ int main(int argc, char** argv) {
   }
   init_logging(log_level);
   if (loopback->parsed()) return run_loopback(settings);
+  if (memory->parsed()) return run_memory(memory_settings);
   return culling->parsed() ? run_culling(culling_settings) : run_report(folder);
 }

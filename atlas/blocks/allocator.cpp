@@ -7,25 +7,35 @@
 namespace tessera::atlas::blocks {
 namespace {
 
-// Levels with log_h <= log_w, counted row by row.
-size_t level_index(Level level) {
-  return size_t{level.log_w} * (level.log_w + 1u) / 2 + level.log_h;
-}
-
 int32_t ceil_divide(int32_t value, int32_t by) {
   return (value + by - 1) / by;
 }
 
 }  // namespace
 
-Allocator::Allocator(uint8_t superblock_log, uint32_t superblocks)
+Allocator::Allocator(uint8_t superblock_log, uint32_t superblocks, Strategy strategy)
     : superblock_log_(superblock_log),
+      strategy_(strategy),
       in_use_(superblocks),
       used_texels_(superblocks),
-      levels_(level_index({superblock_log, superblock_log}) + 1),
-      columns_(superblock_log + 1u) {
+      inaccessible_(superblocks),
+      levels_(level_index({superblock_log, superblock_log}) + 1) {
   assert(superblock_log >= kMinLog && superblock_log <= 8);
+  for (uint8_t log_w = superblock_log; log_w >= kMinLog; --log_w) {
+    if (strategy == Strategy::reference) {
+      add_column(log_w, kMinLog, log_w);
+    } else {
+      for (uint8_t log_h = log_w; log_h >= kMinLog; --log_h) add_column(log_w, log_h, log_h);
+    }
+  }
   reset();
+}
+
+void Allocator::add_column(uint8_t log_w, uint8_t lowest, uint8_t highest) {
+  for (uint8_t log_h = lowest; log_h <= highest; ++log_h) {
+    at({log_w, log_h}).column = static_cast<uint32_t>(columns_.size());
+  }
+  columns_.push_back({.log_w = log_w, .lowest = lowest, .highest = highest});
 }
 
 Allocator::LevelState& Allocator::at(Level level) {
@@ -38,9 +48,11 @@ void Allocator::reset() {
   std::iota(free_superblocks_.rbegin(), free_superblocks_.rend(), 0u);  // the lowest is drawn first
   std::fill(in_use_.begin(), in_use_.end(), uint8_t{0});
   std::fill(used_texels_.begin(), used_texels_.end(), 0u);
-  for (LevelState& level : levels_) level = {};
-  for (uint8_t log_w = kMinLog; log_w <= superblock_log_; ++log_w) {
-    columns_[log_w] = {.superblocks = {0}, .carry_offset = blocks_per_superblock({log_w, log_w})};
+  std::fill(inaccessible_.begin(), inaccessible_.end(), 0u);
+  for (LevelState& level : levels_) level.stack.clear();
+  for (Column& column : columns_) {
+    column.superblocks = {0};
+    column.carry_offset = highest_per_superblock(column);
   }
 }
 
@@ -48,7 +60,7 @@ void Allocator::update(std::span<const Request> requests, std::span<BlockAddress
   assert(requests.size() == out.size());
   request(requests);
   // Widest first: where memory runs out, it runs out for the blocks that a single colour replaces best.
-  for (uint8_t log_w = superblock_log_; log_w >= kMinLog; --log_w) provision(log_w);
+  for (Column& column : columns_) provision(column);
   assign(requests, out);
 }
 
@@ -59,25 +71,28 @@ void Allocator::request(std::span<const Request> requests) {
     const Request& r = requests[i];
     if (r.frees) {
       assert(in_use_[r.old_block.superblock]);
-      at(r.old_level).stack.push_back(r.old_block);
       used_texels_[r.old_block.superblock] -= texel_count(r.old_level);
+      if (strategy_ < Strategy::no_stacks) {
+        at(r.old_level).stack.push_back(r.old_block);
+      } else {
+        inaccessible_[r.old_block.superblock] += texel_count(r.old_level);
+      }
     }
     if (r.allocates) slots_[i] = at(r.level).requested++;
   }
 }
 
 // Thesis algorithm 2, lines 2-13. Space is counted in lines: one texel high, as wide as the column.
-void Allocator::draw_superblocks(uint8_t log_w) {
-  Column& column = columns_[log_w];
-  int32_t lines = (column.carry_offset - blocks_per_superblock({log_w, log_w})) * (1 << log_w);
-  for (uint8_t log_h = kMinLog; log_h <= log_w; ++log_h) {
-    const LevelState& level = at({log_w, log_h});
+void Allocator::draw_superblocks(Column& column) {
+  int32_t lines = (column.carry_offset - highest_per_superblock(column)) * (1 << column.highest);
+  for (uint8_t log_h = column.lowest; log_h <= column.highest; ++log_h) {
+    const LevelState& level = at({column.log_w, log_h});
     // Printed as an assignment in line 4; it is a sum.
     lines += std::max(0, level.requested - static_cast<int32_t>(level.stack.size())) * (1 << log_h);
   }
   column.superblocks.erase(column.superblocks.begin(), column.superblocks.end() - 1);
-  for (int32_t i = ceil_divide(lines, blocks_per_superblock({log_w, 0})); i > 0 && !free_superblocks_.empty();
-       --i) {
+  for (int32_t i = ceil_divide(lines, blocks_per_superblock({column.log_w, 0}));
+       i > 0 && !free_superblocks_.empty(); --i) {
     column.superblocks.push_back(free_superblocks_.back());
     in_use_[free_superblocks_.back()] = 1;
     free_superblocks_.pop_back();
@@ -85,37 +100,36 @@ void Allocator::draw_superblocks(uint8_t log_w) {
 }
 
 // Thesis algorithm 2, lines 14-29.
-void Allocator::provision(uint8_t log_w) {
-  draw_superblocks(log_w);
-  Column& column = columns_[log_w];
+void Allocator::provision(Column& column) {
+  draw_superblocks(column);
   const auto superblocks = static_cast<int32_t>(column.superblocks.size());
-  const int32_t squares = blocks_per_superblock({log_w, log_w});
+  const int32_t highest = highest_per_superblock(column);
   int32_t offset = column.carry_offset;
-  int32_t available = superblocks * squares - offset;
+  int32_t available = superblocks * highest - offset;
   // From high to low, so that no block straddles two columns.
-  for (uint8_t log_h = log_w;; --log_h) {
-    LevelState& level = at({log_w, log_h});
+  for (uint8_t log_h = column.highest;; --log_h) {
+    LevelState& level = at({column.log_w, log_h});
     const int32_t missing = level.requested - static_cast<int32_t>(level.stack.size());
     level.slot_offset = offset;
     level.slot_count = std::clamp(missing, 0, available);
     level.requested = 0;
     offset += level.slot_count;
     available -= level.slot_count;
-    if (log_h == kMinLog) break;
+    if (log_h == column.lowest) break;
     offset *= 2;
     available *= 2;
   }
   // What is left beside the last square goes to the stacks, so that the next frame starts with a square. The
   // printed loop leaves out the last halving.
-  for (uint8_t log_h = kMinLog; log_h < log_w; ++log_h) {
+  for (uint8_t log_h = column.lowest; log_h < column.highest; ++log_h) {
     if (offset % 2 == 1) {
-      const int32_t index = offset % blocks_per_superblock({log_w, log_h});
-      at({log_w, log_h}).stack.push_back({column.superblocks.back(), static_cast<uint32_t>(index)});
+      const int32_t index = offset % blocks_per_superblock({column.log_w, log_h});
+      at({column.log_w, log_h}).stack.push_back({column.superblocks.back(), static_cast<uint32_t>(index)});
     }
     offset = ceil_divide(offset, 2);
   }
   // Relative to the superblock that is carried over; printed without the subtraction (line 28).
-  column.carry_offset = offset - (superblocks - 1) * squares;
+  column.carry_offset = offset - (superblocks - 1) * highest;
 }
 
 // Thesis algorithm 3.
@@ -128,7 +142,7 @@ void Allocator::assign(std::span<const Request> requests, std::span<BlockAddress
     if (slots_[i] < level.slot_count) {
       const int32_t slot = slots_[i] + level.slot_offset;
       const int32_t per_superblock = blocks_per_superblock(r.level);
-      out[i] = {columns_[r.level.log_w].superblocks[static_cast<size_t>(slot / per_superblock)],
+      out[i] = {columns_[level.column].superblocks[static_cast<size_t>(slot / per_superblock)],
                 static_cast<uint32_t>(slot % per_superblock)};
     } else if (!level.stack.empty()) {
       out[i] = level.stack.back();
@@ -150,11 +164,13 @@ uint32_t Allocator::recycle() {
   for (LevelState& level : levels_) {
     std::erase_if(level.stack, [&](const BlockAddress& block) { return is_empty(block.superblock); });
   }
-  for (uint8_t log_w = kMinLog; log_w <= superblock_log_; ++log_w) {
-    Column& column = columns_[log_w];
-    if (is_empty(column.superblocks.back())) column.carry_offset = blocks_per_superblock({log_w, log_w});
+  for (Column& column : columns_) {
+    if (is_empty(column.superblocks.back())) column.carry_offset = highest_per_superblock(column);
   }
-  for (size_t i = free_before; i < free_superblocks_.size(); ++i) in_use_[free_superblocks_[i]] = 0;
+  for (size_t i = free_before; i < free_superblocks_.size(); ++i) {
+    in_use_[free_superblocks_[i]] = 0;
+    inaccessible_[free_superblocks_[i]] = 0;
+  }
   const auto recycled = static_cast<uint32_t>(free_superblocks_.size() - free_before);
   std::sort(free_superblocks_.begin(), free_superblocks_.end(), std::greater<>());
   return recycled;
@@ -171,7 +187,7 @@ void Allocator::for_each_level(Visit visit) const {
 }
 
 std::vector<uint32_t> Allocator::fragmented_texels() const {
-  std::vector<uint32_t> texels(in_use_.size());
+  std::vector<uint32_t> texels = inaccessible_;
   for_each_level([&](uint32_t block_texels, const std::vector<BlockAddress>& stack) {
     for (const BlockAddress& block : stack) texels[block.superblock] += block_texels;
   });
@@ -185,12 +201,24 @@ AllocatorStats Allocator::stats() const {
   for_each_level([&](uint32_t block_texels, const std::vector<BlockAddress>& stack) {
     stats.stack_texels += uint64_t{block_texels} * stack.size();
   });
-  for (uint8_t log_w = kMinLog; log_w <= superblock_log_; ++log_w) {
-    const int32_t squares = blocks_per_superblock({log_w, log_w}) - columns_[log_w].carry_offset;
-    stats.carry_texels += uint64_t{texel_count({log_w, log_w})} * static_cast<uint32_t>(squares);
+  for (const Column& column : columns_) {
+    const int32_t blocks = highest_per_superblock(column) - column.carry_offset;
+    stats.carry_texels +=
+        uint64_t{texel_count({column.log_w, column.highest})} * static_cast<uint32_t>(blocks);
   }
+  stats.inaccessible_texels = std::accumulate(inaccessible_.begin(), inaccessible_.end(), uint64_t{0});
+  stats.free_texels = uint64_t{stats.free_superblocks} << (2 * superblock_log_);
   stats.capacity_texels = uint64_t{in_use_.size()} << (2 * superblock_log_);
   return stats;
+}
+
+AllocatorState Allocator::state() const {
+  AllocatorState state{.free_superblocks = free_superblocks_, .used_texels = used_texels_};
+  for (const LevelState& level : levels_) state.stacks.push_back(level.stack);
+  for (const Column& column : columns_) {
+    state.carries.push_back({column.superblocks.back(), column.carry_offset});
+  }
+  return state;
 }
 
 uvec2 Allocator::offset_in_superblock(const BlockAddress& block, Level level, uint8_t superblock_log) {

@@ -1,7 +1,7 @@
 // The three-phase block allocator (thesis 3.4, algorithms 1-3, with the corrections of docs/method.md):
 // superblocks of columns of blocks. Request frees and counts, provisioning draws superblocks a column width,
-// assignment hands out blocks. In each phase blocks are either freed or allocated, never both, so that a GPU
-// version can run it lock-free with the same arrays; this one runs on one CPU thread.
+// assignment hands out blocks. In each phase blocks are either freed or allocated, never both, so that
+// gpu_allocator.h can run it lock-free with the same arrays; this one runs on one CPU thread.
 #pragma once
 
 #include <cstdint>
@@ -29,18 +29,51 @@ struct Request {
   Level level;
 };
 
+// The strategies that thesis 3.6.3 compares; each lacks what the one before it lacks, and one part more.
+enum class Strategy : uint8_t {
+  reference,   // S0
+  no_columns,  // S1: a superblock holds blocks of one level alone
+  no_stacks,   // S2: a freed block is out of reach until recycle() finds its superblock empty
+  no_resets,   // S3: the layout never resets the atlas; to the allocator the same as S2
+};
+
+// Where the atlas's texels are (thesis fig. 3.9).
 struct AllocatorStats {
   uint32_t free_superblocks = 0;
-  uint64_t used_texels = 0;      // in assigned blocks
-  uint64_t stack_texels = 0;     // free, but only for blocks of the same level
-  uint64_t carry_texels = 0;     // free in the superblocks that columns carry over, for blocks of their width
-  uint64_t capacity_texels = 0;  // of the whole atlas: the sum of the above and of the free superblocks
+  uint64_t used_texels = 0;   // in assigned blocks
+  uint64_t stack_texels = 0;  // free, but only for blocks of the same level
+  // Free at the end of the superblocks that are carried over, for blocks of their column width (level without
+  // columns).
+  uint64_t carry_texels = 0;
+  uint64_t inaccessible_texels = 0;  // freed, but out of reach: only without stacks
+  uint64_t free_texels = 0;          // in free superblocks
+  uint64_t capacity_texels = 0;      // of the whole atlas: the sum of the above
 };
+
+// All that an allocator knows, to compare two of them.
+struct AllocatorState {
+  // What is carried over, in the allocator's order.
+  struct Carry {
+    uint32_t superblock = 0;
+    int32_t offset = 0;
+    bool operator==(const Carry&) const = default;
+  };
+  std::vector<uint32_t> free_superblocks;         // the last is drawn first
+  std::vector<uint32_t> used_texels;              // a superblock
+  std::vector<std::vector<BlockAddress>> stacks;  // by level_index()
+  std::vector<Carry> carries;                     // widest first
+  bool operator==(const AllocatorState&) const = default;
+};
+
+// Levels with log_h <= log_w, counted row by row.
+constexpr uint32_t level_index(Level level) {
+  return uint32_t{level.log_w} * (level.log_w + 1u) / 2 + level.log_h;
+}
 
 class Allocator {
  public:
   // `superblock_log`: log2 of a superblock's side, 1..8. `superblocks`: how many there are.
-  Allocator(uint8_t superblock_log, uint32_t superblocks);
+  Allocator(uint8_t superblock_log, uint32_t superblocks, Strategy strategy = Strategy::reference);
 
   // Runs the three phases. out[i] = the block of requests[i], or nullopt-like kNoBlock if it does not
   // allocate or memory ran out. Equal inputs give equal outputs.
@@ -54,8 +87,9 @@ class Allocator {
   AllocatorStats stats() const;
   // Texels in assigned blocks, a superblock.
   std::span<const uint32_t> used_texels() const { return used_texels_; }
-  // Texels on the stacks, a superblock: what emptying it would win.
+  // Texels on the stacks and out of reach, a superblock: what emptying it would win.
   std::vector<uint32_t> fragmented_texels() const;
+  AllocatorState state() const;
 
   // Top-left texel of a block inside its superblock, and back.
   static uvec2 offset_in_superblock(const BlockAddress& block, Level level, uint8_t superblock_log);
@@ -64,9 +98,11 @@ class Allocator {
   static constexpr BlockAddress kNoBlock{0xffffffffu, 0xffffffffu};
 
  private:
-  // The superblocks that a column width allocates from in this frame (`sb` in algorithm 2). The first is
-  // carried over from the frame before, with `carry_offset` square blocks of it already taken.
+  // The superblocks that a column width (level without columns) allocates from in this frame (`sb` in
+  // algorithm 2). The first is carried over from the frame before, with `carry_offset` of its highest blocks
+  // already taken.
   struct Column {
+    uint8_t log_w = 0, lowest = 0, highest = 0;  // its levels' width and heights
     std::vector<uint32_t> superblocks;
     int32_t carry_offset = 0;
   };
@@ -76,6 +112,7 @@ class Allocator {
     int32_t requested = 0;
     int32_t slot_offset = 0,
             slot_count = 0;  // requests below slot_count are served from the column's superblocks
+    uint32_t column = 0;     // in columns_
   };
 
   int32_t blocks_per_superblock(Level level) const {
@@ -86,17 +123,23 @@ class Allocator {
   // visit(texels of a block, its stack)
   template <typename Visit>
   void for_each_level(Visit visit) const;
+  void add_column(uint8_t log_w, uint8_t lowest, uint8_t highest);
+  int32_t highest_per_superblock(const Column& column) const {
+    return blocks_per_superblock({column.log_w, column.highest});
+  }
   void request(std::span<const Request> requests);
-  void provision(uint8_t log_w);
-  void draw_superblocks(uint8_t log_w);
+  void provision(Column& column);
+  void draw_superblocks(Column& column);
   void assign(std::span<const Request> requests, std::span<BlockAddress> out);
 
   uint8_t superblock_log_;
+  Strategy strategy_;
   std::vector<uint32_t> free_superblocks_;  // a stack
   std::vector<uint8_t> in_use_;             // a superblock: not in free_superblocks_
   std::vector<uint32_t> used_texels_;       // a superblock
+  std::vector<uint32_t> inaccessible_;      // a superblock: texels
   std::vector<LevelState> levels_;
-  std::vector<Column> columns_;  // by log2 of the width
+  std::vector<Column> columns_;  // widest first
   std::vector<int32_t> slots_;   // a request
 };
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 
-#include "atlas/blocks/allocator.h"
 #include "atlas/blocks/staged_reset.h"
 
 namespace tessera::atlas::blocks {
@@ -13,6 +12,7 @@ constexpr uint32_t kMaxSide = 8192;  // texels
 constexpr uint64_t kStages = 8;      // a stage moves at most this part of the atlas
 constexpr int kPauseFrames = 15;     // between two resets; longer while resets do not help
 constexpr int kLongestPauseFrames = 240;
+constexpr int kMostHalvings = 3;
 constexpr float kRelief = 0.9f;  // of the high-water mark: a reset may end early below it
 
 Status check(const LayoutSettings& s) {
@@ -43,6 +43,12 @@ Level level_of(const Placement& p) {
   return {static_cast<uint8_t>(std::countr_zero(p.width)), static_cast<uint8_t>(std::countr_zero(p.height))};
 }
 
+// A block that is the smallest already stays.
+void halve(Placement& p) {
+  const uint64_t smallest = (p.masked ? 2u : 1u) << (2 * kMinLog);
+  if (p.texels() > smallest) (p.width > p.height ? p.width : p.height) /= 2;
+}
+
 // A patch's place and whether it went without one for want of memory.
 struct Places {
   std::vector<Placement> placements;  // sorted by patch
@@ -57,7 +63,7 @@ struct Places {
 }  // namespace
 
 LayoutSettings settings_for(uint32_t width, uint32_t height) {
-  constexpr uint64_t kLeastSuperblocks = 64;
+  constexpr uint64_t kLeastSuperblocks = 128;
   LayoutSettings settings{.width = width, .height = height};
   while (settings.superblock_log > kMinLog &&
          ((uint64_t{width} * height) >> (2 * settings.superblock_log)) < kLeastSuperblocks) {
@@ -68,11 +74,12 @@ LayoutSettings settings_for(uint32_t width, uint32_t height) {
 }
 
 struct Layout::Impl {
-  Impl(const scene::Scene& scene, const LayoutSettings& s)
+  Impl(const scene::Scene& scene, const LayoutSettings& s, Strategy strategy)
       : settings(s),
+        may_reset(strategy < Strategy::no_resets),
         traits(scene),
         superblocks((s.width >> s.superblock_log) * (s.height >> s.superblock_log)),
-        allocator(s.superblock_log, superblocks),
+        allocator(s.superblock_log, superblocks, strategy),
         reset(superblocks),
         target(static_cast<double>(s.width) * s.height) {
     settings.levels.max_log = std::min(settings.levels.max_log, settings.superblock_log);
@@ -83,6 +90,7 @@ struct Layout::Impl {
   void choose_levels(const scene::VisiblePatches& visible);
   void choose_level(scene::PatchId patch, const BlockNeed& need, size_t old);
   void allocate();
+  void allocate_moving();
   void plan_next_frame();
   void count(const LayoutDelta& delta);
 
@@ -95,6 +103,7 @@ struct Layout::Impl {
   }
 
   LayoutSettings settings;
+  bool may_reset;
   PatchTraitTable traits;
   uint32_t superblocks;
   Allocator allocator;
@@ -225,20 +234,39 @@ void Layout::Impl::allocate() {
 
   // Who had a block comes first: losing it would show more than not getting one.
   moving.insert(moving.end(), entering.begin(), entering.end());
+  allocate_moving();
+  stats.blocks_halved = 0;
+  // Fewer samples show less than a single colour does.
+  for (int halvings = 0; halvings < kMostHalvings && !moving.empty(); ++halvings) {
+    for (const uint32_t index : moving) halve(now.placements[index]);
+    stats.blocks_halved += static_cast<uint32_t>(moving.size());
+    allocate_moving();
+    stats.blocks_halved -= static_cast<uint32_t>(moving.size());
+  }
+  for (const uint32_t index : moving) {
+    Placement& placement = now.placements[index];
+    placement = {.patch = placement.patch, .masked = placement.masked};
+    now.starved[index] = 1;
+  }
+}
+
+// Leaves in `moving` those that find no memory.
+void Layout::Impl::allocate_moving() {
+  allocations.clear();
   for (const uint32_t index : moving) {
     allocations.push_back({.allocates = true, .level = level_of(now.placements[index])});
   }
   blocks.resize(allocations.size());
   allocator.update(allocations, blocks);
-  for (size_t i = 0; i < moving.size(); ++i) {
-    Placement& placement = now.placements[moving[i]];
+  size_t left = 0;
+  for (size_t i = 0; i < blocks.size(); ++i) {
     if (blocks[i] != Allocator::kNoBlock) {
-      place(placement, blocks[i]);
+      place(now.placements[moving[i]], blocks[i]);
     } else {
-      placement = {.patch = placement.patch, .masked = placement.masked};
-      now.starved[moving[i]] = 1;
+      moving[left++] = moving[i];
     }
   }
+  moving.resize(left);
 }
 
 void Layout::Impl::count(const LayoutDelta& delta) {
@@ -260,11 +288,11 @@ void Layout::Impl::plan_next_frame() {
   const AllocatorStats memory = allocator.stats();
   const float share_in_use =
       1 - static_cast<float>(memory.free_superblocks) / static_cast<float>(superblocks);
-  const bool starved = stats.colors_out_of_memory > 0;
+  const bool starved = stats.colors_out_of_memory > 0 || stats.blocks_halved > 0;
   const bool above_mark = share_in_use > settings.high_water;
-  const bool fragmented = memory.stack_texels >= memory.capacity_texels / superblocks;
-  const uint64_t spare_texels =
-      memory.carry_texels + memory.free_superblocks * (memory.capacity_texels / superblocks);
+  const bool fragmented =
+      memory.stack_texels + memory.inaccessible_texels >= memory.capacity_texels / superblocks;
+  const uint64_t spare_texels = memory.carry_texels + memory.free_texels;
   memory_short = starved || static_cast<float>(spare_texels) <
                                 (1 - settings.high_water) * static_cast<float>(memory.capacity_texels);
   ++frames_since_reset;
@@ -272,7 +300,7 @@ void Layout::Impl::plan_next_frame() {
     if (!starved && share_in_use < kRelief * settings.high_water) reset.stop();
     if (!starved) pause_frames = kPauseFrames;
     frames_since_reset = 0;
-  } else if ((starved || (above_mark && fragmented)) && frames_since_reset >= pause_frames) {
+  } else if (may_reset && (starved || (above_mark && fragmented)) && frames_since_reset >= pause_frames) {
     reset.start(allocator.used_texels());
     if (starved) target.on_out_of_memory();  // fragmentation alone is cured by the reset
     ++stats.resets_total;
@@ -282,9 +310,10 @@ void Layout::Impl::plan_next_frame() {
   }
 }
 
-StatusOr<std::unique_ptr<Layout>> Layout::create(const scene::Scene& scene, const LayoutSettings& settings) {
+StatusOr<std::unique_ptr<Layout>> Layout::create(const scene::Scene& scene, const LayoutSettings& settings,
+                                                 Strategy strategy) {
   TESSERA_RETURN_IF_ERROR(check(settings));
-  return std::unique_ptr<Layout>(new Layout(std::make_unique<Impl>(scene, settings)));
+  return std::unique_ptr<Layout>(new Layout(std::make_unique<Impl>(scene, settings, strategy)));
 }
 
 Layout::Layout(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -297,6 +326,9 @@ std::span<const Placement> Layout::placements() const {
 }
 const LayoutStats& Layout::stats() const {
   return impl_->stats;
+}
+AllocatorStats Layout::memory() const {
+  return impl_->allocator.stats();
 }
 
 }  // namespace tessera::atlas::blocks

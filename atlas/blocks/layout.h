@@ -3,25 +3,30 @@
 
 #include <memory>
 
+#include "atlas/blocks/allocator.h"
 #include "atlas/layout.h"
 
 namespace tessera::atlas::blocks {
 
 // Settings for an atlas of this size: the largest superblocks, up to 256 texels a side, of which there are at
-// least 64. Each block width in use holds a superblock of its own, so fewer would starve patches long before
+// least 128. Each block width in use holds a superblock of its own, so fewer would starve patches long before
 // the atlas is full.
 LayoutSettings settings_for(uint32_t width, uint32_t height);
 
-// When memory runs out, the next frames re-place the atlas in stages (a share of the superblocks a frame).
+// A patch that finds no block of its level takes a smaller one, then a colour. When memory runs out, the next
+// frames re-place the atlas in stages (a share of the superblocks a frame).
 class Layout final : public atlas::Layout {
  public:
-  // InvalidArgument if the size does not fit the superblocks. `scene` gives the patches' traits.
-  static StatusOr<std::unique_ptr<Layout>> create(const scene::Scene& scene, const LayoutSettings& settings);
+  // InvalidArgument if the size does not fit the superblocks. `scene` gives the patches' traits. Strategies
+  // other than the reference are for comparison.
+  static StatusOr<std::unique_ptr<Layout>> create(const scene::Scene& scene, const LayoutSettings& settings,
+                                                  Strategy strategy = Strategy::reference);
   ~Layout() override;
 
   LayoutDelta update(const LayoutInput& input) override;
   std::span<const Placement> placements() const override;
   const LayoutStats& stats() const override;
+  AllocatorStats memory() const;  // where the atlas's texels are
 
  private:
   struct Impl;

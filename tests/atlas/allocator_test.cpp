@@ -6,6 +6,7 @@
 #include <random>
 
 #include "occupancy.h"
+#include "random_level.h"
 
 namespace tessera::atlas::blocks {
 namespace {
@@ -18,10 +19,10 @@ struct Owner {
 // Drives an allocator and knows who owns what. Its superblocks lie below each other.
 class Model {
  public:
-  Model(uint8_t superblock_log, uint32_t superblocks, size_t patches)
+  Model(uint8_t superblock_log, uint32_t superblocks, size_t patches, Strategy strategy = Strategy::reference)
       : superblock_log_(superblock_log),
         superblocks_(superblocks),
-        allocator(superblock_log, superblocks),
+        allocator(superblock_log, superblocks, strategy),
         owners(patches) {}
 
   // Sets the wish of a patch for the next step(); nullopt = leaves.
@@ -78,10 +79,12 @@ class Model {
     const AllocatorStats s = allocator.stats();
     ASSERT_EQ(s.used_texels, occupancy.texels());
     ASSERT_EQ(s.capacity_texels, uint64_t{side} * side * superblocks_);
-    ASSERT_EQ(s.used_texels + s.stack_texels + s.carry_texels + uint64_t{s.free_superblocks} * side * side,
+    ASSERT_EQ(s.free_texels, uint64_t{s.free_superblocks} * side * side);
+    ASSERT_EQ(s.used_texels + s.stack_texels + s.carry_texels + s.inaccessible_texels + s.free_texels,
               s.capacity_texels);
     const std::vector<uint32_t> fragmented = allocator.fragmented_texels();
-    ASSERT_EQ(std::accumulate(fragmented.begin(), fragmented.end(), uint64_t{0}), s.stack_texels);
+    ASSERT_EQ(std::accumulate(fragmented.begin(), fragmented.end(), uint64_t{0}),
+              s.stack_texels + s.inaccessible_texels);
   }
 
  private:
@@ -95,18 +98,6 @@ class Model {
   std::vector<Owner> owners;
 };
 
-Level random_level(std::mt19937& random, uint8_t max_log) {
-  // Small blocks are many.
-  const auto draw = [&] {
-    std::uniform_real_distribution<float> uniform(0, 1);
-    const float v = uniform(random);
-    return static_cast<uint8_t>(kMinLog +
-                                static_cast<int>(v * v * static_cast<float>(max_log - kMinLog) + 0.5f));
-  };
-  const uint8_t a = draw(), b = draw();
-  return {std::max(a, b), std::min(a, b)};
-}
-
 Model filled(uint8_t superblock_log, uint32_t superblocks, Level level, size_t patches) {
   Model model(superblock_log, superblocks, patches);
   for (size_t i = 0; i < patches; ++i) model.wish(i, level);
@@ -114,11 +105,16 @@ Model filled(uint8_t superblock_log, uint32_t superblocks, Level level, size_t p
   return model;
 }
 
-TEST(Allocator, LongRandomRunsNeverOverlapOrLeak) {
+class AllocatorStrategies : public testing::TestWithParam<Strategy> {};
+INSTANTIATE_TEST_SUITE_P(All, AllocatorStrategies,
+                         testing::Values(Strategy::reference, Strategy::no_columns, Strategy::no_stacks,
+                                         Strategy::no_resets));
+
+TEST_P(AllocatorStrategies, LongRandomRunsNeverOverlapOrLeak) {
   for (uint32_t seed = 0; seed < 6; ++seed) {
     std::mt19937 random(seed);
     const uint8_t log = seed % 2 ? 5 : 6;
-    Model model(log, seed % 2 ? 64 : 20, 3000);
+    Model model(log, seed % 2 ? 64 : 20, 3000, GetParam());
     const uint32_t churn_percent = 2 + 8 * seed;
     uint64_t failed = 0;
     for (int frame = 0; frame < 250; ++frame) {
@@ -140,6 +136,36 @@ TEST(Allocator, LongRandomRunsNeverOverlapOrLeak) {
     EXPECT_EQ(model.allocator.stats().used_texels, 0u);
     EXPECT_EQ(model.allocator.stats().free_superblocks, seed % 2 ? 64u : 20u);
   }
+}
+
+TEST(Allocator, WithoutColumnsEachLevelTakesASuperblockOfItsOwn) {
+  for (const auto& [strategy, drawn] : {std::pair{Strategy::reference, 1u}, {Strategy::no_columns, 4u}}) {
+    Model model(6, 8, 4, strategy);
+    for (uint8_t i = 0; i < 4; ++i) model.wish(i, Level{4, static_cast<uint8_t>(i + 1)});
+    EXPECT_EQ(model.step(), 0u);
+    ASSERT_NO_FATAL_FAILURE(model.check());
+    EXPECT_EQ(model.allocator.stats().free_superblocks, 8 - drawn);
+  }
+}
+
+TEST(Allocator, WithoutStacksAFreedBlockWaitsForItsWholeSuperblock) {
+  Model model(4, 1, 64, Strategy::no_stacks);
+  for (size_t i = 0; i < 64; ++i) model.wish(i, Level{1, 1});
+  EXPECT_EQ(model.step(), 0u);
+  model.wish(0, std::nullopt);
+  EXPECT_EQ(model.step(), 0u);
+  EXPECT_EQ(model.allocator.stats().inaccessible_texels, 4u);
+  EXPECT_EQ(model.allocator.stats().stack_texels, 0u);
+  EXPECT_EQ(model.allocator.recycle(), 0u);
+  model.wish(0, Level{1, 1});
+  EXPECT_EQ(model.step(), 1u);
+  model.leave_all();
+  EXPECT_EQ(model.allocator.stats().inaccessible_texels, 256u);
+  EXPECT_EQ(model.allocator.recycle(), 1u);
+  EXPECT_EQ(model.allocator.stats().free_texels, 256u);
+  model.wish(0, Level{1, 1});
+  EXPECT_EQ(model.step(), 0u);
+  ASSERT_NO_FATAL_FAILURE(model.check());
 }
 
 TEST(Allocator, EqualInputsGiveEqualOutputs) {

@@ -93,6 +93,7 @@ class LayoutTest : public testing::Test {
       ++blocks;
       ASSERT_EQ(p.x % p.width, 0u);
       ASSERT_EQ(p.y % p.height, 0u);
+      ASSERT_GE(std::min(p.color_width(), p.color_height()), 2u);
       ASSERT_TRUE(occupancy.take(p.x, p.y, p.width, p.height)) << "patch " << p.patch;
     }
     const LayoutStats& stats = layout_->stats();
@@ -213,6 +214,25 @@ TEST_F(LayoutTest, ExactlyFullAtlas) {
   EXPECT_EQ(placement(64).kind, PlacementKind::block);
 }
 
+TEST_F(LayoutTest, WhoFindsNoBlockTakesASmallerOneForAWhile) {
+  make(65, {.width = 128,
+            .height = 128,
+            .superblock_log = 4,
+            .high_water = 1,
+            .levels = {.min_bias = 0, .max_bias = 0}});
+  VisiblePatches visible = squares(63, 16);
+  visible.push_back(square(63, 8));  // takes a quarter of the last superblock
+  update(visible);
+  visible.push_back(square(64, 16));
+  update(visible);
+  EXPECT_EQ(layout_->stats().blocks_halved, 1u);
+  EXPECT_EQ(layout_->stats().colors_out_of_memory, 0u);
+  EXPECT_EQ(sides(64), uvec2(8, 8));
+  visible.erase(visible.begin() + 7);
+  for (int frame = 0; frame < 3; ++frame) update(visible);
+  EXPECT_EQ(sides(64), uvec2(16, 16));
+}
+
 // All superblocks in use is not the same as no memory.
 TEST_F(LayoutTest, BlocksGrowInAnAtlasOfOneSuperblock) {
   make(4, {.width = 64, .height = 64, .superblock_log = 6, .levels = {.min_bias = 0}});
@@ -316,6 +336,40 @@ TEST_F(CrowdedLayoutTest, ResetsMoveABoundedShareAFrame) {
   EXPECT_GT(layout_->stats().resets_total, 0u);
 }
 
+// What thesis fig. 3.9 shows.
+TEST_F(CrowdedLayoutTest, EachPartThatAStrategyLacksCostsMemory) {
+  const scene::Scene scene = make_scene(kPatches);
+  LayoutSettings settings = settings_;
+  settings.superblock_log = settings.levels.max_log = 6;
+  std::vector<std::unique_ptr<Layout>> layouts;
+  for (const Strategy strategy :
+       {Strategy::reference, Strategy::no_columns, Strategy::no_stacks, Strategy::no_resets})
+    layouts.push_back(*Layout::create(scene, settings, strategy));
+  std::array<uint64_t, 4> carried{}, fragmented{};
+  std::array<uint32_t, 4> short_of_memory{};
+  for (int frame = 0; frame < 200; ++frame) {
+    const VisiblePatches visible = next(1, frame == 0 ? 50 : 4);
+    for (size_t s = 0; s < layouts.size(); ++s) {
+      layouts[s]->update({visible});
+      const AllocatorStats m = layouts[s]->memory();
+      ASSERT_EQ(m.used_texels + m.stack_texels + m.carry_texels + m.inaccessible_texels + m.free_texels,
+                kSide * kSide);
+      EXPECT_TRUE(s < 2 ? m.inaccessible_texels == 0 : m.stack_texels == 0);
+      carried[s] += m.carry_texels;
+      fragmented[s] += m.carry_texels + m.stack_texels + m.inaccessible_texels;
+      short_of_memory[s] += layouts[s]->stats().colors_out_of_memory + layouts[s]->stats().blocks_halved;
+    }
+  }
+  EXPECT_LT(carried[0], carried[1]);
+  EXPECT_LT(fragmented[0], fragmented[1]);
+  EXPECT_LT(fragmented[1], fragmented[3]);
+  EXPECT_LT(fragmented[2], fragmented[3]);
+  EXPECT_EQ(short_of_memory[0], 0u);
+  EXPECT_GT(short_of_memory[3], 0u);
+  EXPECT_GT(layouts[2]->stats().resets_total, 0u);
+  EXPECT_EQ(layouts[3]->stats().resets_total, 0u);
+}
+
 TEST_F(CrowdedLayoutTest, EqualInputsGiveEqualLayouts) {
   const scene::Scene scene = make_scene(kPatches);
   const auto twin = *Layout::create(scene, settings_);
@@ -342,17 +396,18 @@ TEST_F(LayoutTest, HopelessAtlasSettles) {
   EXPECT_LT(changed, 500u);
 }
 
-TEST(SettingsFor, KeepsAtLeast64SuperblocksThatTileTheAtlas) {
+TEST(SettingsFor, KeepsAtLeast128SuperblocksThatTileTheAtlas) {
   for (const auto& [width, height, log] : {std::tuple{512u, 256u, 5},
-                                           {1024u, 1024u, 7},
+                                           {1024u, 1024u, 6},
                                            {2048u, 1024u, 7},
+                                           {2048u, 2048u, 7},
                                            {4096u, 2048u, 8},
                                            {8192u, 8192u, 8},
-                                           {64u, 64u, 3}}) {
+                                           {64u, 64u, 2}}) {
     const LayoutSettings settings = settings_for(width, height);
     EXPECT_EQ(settings.superblock_log, log) << width << "x" << height;
     EXPECT_EQ(settings.levels.max_log, log);
-    EXPECT_GE((width >> log) * (height >> log), 64u);
+    EXPECT_GE((width >> log) * (height >> log), 128u);
   }
 }
 
