@@ -62,7 +62,7 @@ const ObjectPriority* priority_of(const scene::Scene& scene, uint32_t node,
   return nullptr;
 }
 
-Status check(const scene::Scene& scene, const ObjectPriority& priority) {
+Status check_priority(const scene::Scene& scene, const ObjectPriority& priority) {
   if (!(priority.density >= kMinPriority && priority.density <= kMaxPriority)) {
     return absl::InvalidArgumentError(absl::StrCat("density: priority ", priority.density, " of object `",
                                                    priority.node, "`; it must be ", kMinPriority, " to ",
@@ -108,9 +108,15 @@ double barrel_scale(double n) {
   return std::min(1.0, 5.4e-4 / n + 0.98 + n * (0.13 + n * (-0.56 + n * (0.32 - n * 0.06))));
 }
 
+Status Density::check(const scene::Scene& scene, const DensitySettings& settings) {
+  for (const ObjectPriority& priority : settings.priorities)
+    TESSERA_RETURN_IF_ERROR(check_priority(scene, priority));
+  return absl::OkStatus();
+}
+
 StatusOr<std::unique_ptr<Density>> Density::create(const scene::Scene& scene, const DensitySettings& settings,
                                                    const DensityDisplay& display) {
-  for (const ObjectPriority& priority : settings.priorities) TESSERA_RETURN_IF_ERROR(check(scene, priority));
+  TESSERA_RETURN_IF_ERROR(check(scene, settings));
   std::unique_ptr<Density> density(new Density(scene, settings, display));
   if (settings.priorities.empty()) return density;
   for (const scene::Instance& instance : scene.instances) {

@@ -76,8 +76,9 @@ double barrel_scale(double n);
 // Thread-safe.
 class Density {
  public:
-  // InvalidArgument names a priority that is out of range or that no node of the scene bears. The scene
-  // outlives it.
+  // InvalidArgument names a priority that is out of range or that no node of the scene bears.
+  static Status check(const scene::Scene& scene, const DensitySettings& settings);
+  // Errors as check(). The scene outlives it.
   static StatusOr<std::unique_ptr<Density>> create(const scene::Scene& scene, const DensitySettings& settings,
                                                    const DensityDisplay& display);
 

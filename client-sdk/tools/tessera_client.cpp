@@ -62,7 +62,7 @@ View view_of(const Settings& s) {
 transport::ClientSettings client_settings(const Settings& s) {
   return {.width = static_cast<uint16_t>(s.width),
           .height = static_cast<uint16_t>(s.height),
-          .fov = view_of(s).fov,
+          .eyes = {{.fov = view_of(s).fov}},
           .display_hz = static_cast<float>(s.fps),
           .name = "tessera-client"};
 }

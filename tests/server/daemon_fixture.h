@@ -100,7 +100,7 @@ class DaemonTest : public testing::Test {
     EXPECT_EQ(ticket.token().size(), settings.token.size());
     std::copy(ticket.token().begin(), ticket.token().end(), settings.token.begin());
     settings.client = {
-        .width = 160, .height = 90, .fov = Fov::symmetric(1.0f, 16.0f / 9.0f), .display_hz = 60};
+        .width = 160, .height = 90, .eyes = {{.fov = Fov::symmetric(1.0f, 16.0f / 9.0f)}}, .display_hz = 60};
     return settings;
   }
   StatusOr<std::unique_ptr<client::Connection>> connect(const v1::Ticket& ticket) {
