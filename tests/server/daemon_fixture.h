@@ -62,12 +62,14 @@ class DaemonTest : public testing::Test {
     v1::UnloadSceneResponse response;
     return control_->UnloadScene(&context, request, &response);
   }
-  grpc::Status create(const std::string& scene, v1::Ticket* ticket, uint32_t atlas_width = 512) {
+  grpc::Status create(const std::string& scene, v1::Ticket* ticket, uint32_t atlas_width = 512,
+                      const v1::Density& density = {}) {
     grpc::ClientContext context;
     v1::CreateSessionRequest request;
     request.set_scene(scene);
     request.mutable_settings()->set_atlas_width(atlas_width);
     request.mutable_settings()->set_atlas_height(256);
+    *request.mutable_settings()->mutable_density() = density;
     return control_->CreateSession(&context, request, ticket);
   }
   grpc::Status update(uint64_t session, const v1::SessionSettings& settings, v1::Session* out = nullptr) {
