@@ -202,6 +202,12 @@ int main(int argc, char** argv) {
       ->envname("TESSERA_BENCH_EYE_DISTANCE_MM")
       ->group("Client")
       ->capture_default_str();
+  std::vector<std::string> methods;
+  for (const bench::SpatialCase& method : bench::spatial_cases()) methods.push_back(method.name);
+  spatial->add_option("--methods", spatial_settings.methods, "which to measure; default: all")
+      ->check(CLI::IsMember(methods))
+      ->delimiter(',')
+      ->group("Server");
   spatial->footer(kSpatialFooter);
   spatial->fallthrough();
 

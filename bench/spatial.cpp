@@ -209,7 +209,11 @@ Status Study::measure(const SpatialCase& method) {
 
 StatusOr<SpatialResult> Study::run() {
   TESSERA_RETURN_IF_ERROR(set_up());
-  const std::vector<SpatialCase> cases = spatial_cases();
+  std::vector<SpatialCase> cases = spatial_cases();
+  const std::vector<std::string>& wanted = settings_.methods;
+  std::erase_if(cases, [&](const SpatialCase& method) {
+    return !wanted.empty() && std::ranges::find(wanted, method.name) == wanted.end();
+  });
   progress_.begin("frames", cases.size() * result_.frames);
   for (const SpatialCase& method : cases) TESSERA_RETURN_IF_ERROR(measure(method));
   return std::move(result_);
@@ -248,9 +252,10 @@ std::vector<SpatialCase> spatial_cases() {
   for (const std::optional<float> bias : {std::optional<float>(0.0f), std::optional<float>()}) {
     cases.push_back({.name = "mono", .bias = bias});
     cases.push_back({.name = "stereo", .bias = bias, .stereo = true});
-    cases.push_back({.name = "foveated", .bias = bias, .density = {.foveated = true}});
+    cases.push_back({.name = "foveated", .bias = bias, .density = {.foveation = 1}});
+    cases.push_back({.name = "foveated x2", .bias = bias, .density = {.foveation = 2}});
     cases.push_back({.name = "barrel", .bias = bias, .density = {.barrel = true}});
-    cases.push_back({.name = "stereo foveated", .bias = bias, .stereo = true, .density = {.foveated = true}});
+    cases.push_back({.name = "stereo foveated", .bias = bias, .stereo = true, .density = {.foveation = 1}});
   }
   for (const float bias : {1.0f, 2.0f}) cases.push_back({.name = "upsampled", .bias = bias});
   return cases;

@@ -17,6 +17,7 @@ namespace tessera::bench {
 struct SpatialSettings {
   LoopbackSettings common;  // see spatial_options()
   double eye_distance_mm = 63;
+  std::vector<std::string> methods;  // names of cases to measure; none: all
   bool operator==(const SpatialSettings&) const = default;
 };
 // The thesis' picture, an atlas that holds it without a bias, and a frame a second.

@@ -46,7 +46,7 @@ StatusOr<transport::PeerAddress> caller_address(const std::string& peer, uint16_
 
 Status read(const v1::Density& density, SessionSettings& settings) {
   constexpr int kMaxPriorities = 256;
-  settings.density.foveated = density.foveation();
+  settings.density.foveation = static_cast<float>(density.foveation());
   settings.density.barrel = density.barrel_distortion();
   atlas::LevelSettings& levels = settings.layout.levels;
   if (density.has_bias()) {

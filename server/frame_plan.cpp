@@ -18,7 +18,7 @@ PlannedPass needed(const std::string& name, bool is_needed, const std::string& w
 
 PlannedPass density_pass(const atlas::DensitySettings& density) {
   std::vector<std::string> causes;
-  if (density.foveated) causes.push_back("foveation");
+  if (density.foveation > 0) causes.push_back("foveation");
   if (density.barrel) causes.push_back("barrel distortion");
   if (const size_t count = density.priorities.size(); count > 0)
     causes.push_back(absl::StrFormat("%d object priorities", count));

@@ -196,7 +196,7 @@ TEST_F(DaemonTest, ADensityIsCheckedAgainstTheSceneAndKept) {
   v1::Ticket ticket;
   const auto with = [](const std::string& node, double density, double bias) {
     v1::Density wanted;
-    wanted.set_foveation(true);
+    wanted.set_foveation(1);
     wanted.set_bias(bias);
     v1::ObjectPriority& priority = *wanted.add_priorities();
     priority.set_node(node);
@@ -208,6 +208,9 @@ TEST_F(DaemonTest, ADensityIsCheckedAgainstTheSceneAndKept) {
   expect_refused(create("hall", &ticket, 512, with("root", 65, 0)), kInvalid, "65");
   expect_refused(create("hall", &ticket, 512, with("root", 2, 17)), kInvalid, "settings.density.bias");
   expect_refused(create("hall", &ticket, 512, with("root", 2, NAN)), kInvalid, "settings.density.bias");
+  v1::Density blind;
+  blind.set_foveation(9);
+  expect_refused(create("hall", &ticket, 512, blind), kInvalid, "foveation of 9");
   v1::Density many;
   for (int i = 0; i < 257; ++i) *many.add_priorities() = with("root", 2, 0).priorities(0);
   expect_refused(create("hall", &ticket, 512, many), kInvalid, "257");
@@ -218,7 +221,7 @@ TEST_F(DaemonTest, ADensityIsCheckedAgainstTheSceneAndKept) {
   settings.set_bitrate_mbps(8);
   EXPECT_TRUE(update(ticket.session(), settings).ok()) << "the same density";
   EXPECT_EQ(get(ticket.session()).settings().density().priorities_size(), 1);
-  settings.mutable_density()->set_foveation(false);
+  settings.mutable_density()->set_foveation(0);
   expect_refused(update(ticket.session(), settings), grpc::StatusCode::FAILED_PRECONDITION, "density");
   auto client = connect(ticket);
   ASSERT_TRUE(client.ok()) << client.status();

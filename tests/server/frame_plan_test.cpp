@@ -27,12 +27,12 @@ TEST(FramePlan, EachFeatureBringsItsPass) {
 TEST(FramePlan, DensityIsLeftOutUnlessTheSessionAsksForIt) {
   EXPECT_FALSE(make_frame_plan({}).includes("density"));
   for (const atlas::DensitySettings& density :
-       {atlas::DensitySettings{.foveated = true}, atlas::DensitySettings{.barrel = true},
+       {atlas::DensitySettings{.foveation = 1}, atlas::DensitySettings{.barrel = true},
         atlas::DensitySettings{.priorities = {{"table", 2}}}}) {
     EXPECT_TRUE(density.any());
     EXPECT_TRUE(make_frame_plan({}, density).includes("density"));
   }
-  const std::string text = make_frame_plan({}, {.foveated = true, .barrel = true}).to_string();
+  const std::string text = make_frame_plan({}, {.foveation = 1, .barrel = true}).to_string();
   EXPECT_NE(text.find("foveation, barrel distortion"), std::string::npos) << text;
 }
 

@@ -219,7 +219,7 @@ TEST_F(SpatialSessionTest, FoveationSavesSamplesAndTheGazeSaysWhere) {
     // A display that shows more than the eye sees but for the middle 12 degrees.
     settings.client_view.width = 960;
     settings.client_view.height = 720;
-    settings.density.foveated = foveated;
+    settings.density.foveation = foveated ? 1 : 0;
     const auto rendered = session(settings);
     FrameInput one = input(0, poses);
     one.gaze = gaze;
