@@ -33,6 +33,10 @@ Pose normalized(const Pose& pose) {
   return out;
 }
 
+Pose compose(const Pose& outer, const Pose& inner) {
+  return {outer.position + outer.orientation * inner.position, outer.orientation * inner.orientation};
+}
+
 Pose interpolate(const Pose& a, const Pose& b, double t) {
   Pose out;
   out.position = a.position + (b.position - a.position) * t;

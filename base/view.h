@@ -27,6 +27,9 @@ struct TimedPose {
 // non-finite position components become 0.
 Pose normalized(const Pose& pose);
 
+// Where something is that `inner` places within `outer`, e.g. an eye in a head.
+Pose compose(const Pose& outer, const Pose& inner);
+
 // Position: linear; orientation: slerp along the shorter arc. `t` outside [0, 1] extrapolates.
 Pose interpolate(const Pose& a, const Pose& b, double t);
 
@@ -40,6 +43,13 @@ struct Fov {
   Fov widened(float horizontal_rad, float vertical_rad) const;
   float width_rad() const;   // horizontal angle
   float height_rad() const;  // vertical angle
+};
+
+// One of a viewer's eyes: where it is within the head, whose axes are a camera's, and what it sees from
+// there.
+struct Eye {
+  Pose in_head;
+  Fov fov;
 };
 
 // Everything nearer is clipped, in every pass of both ends.

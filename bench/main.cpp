@@ -13,6 +13,7 @@
 #include "bench/loopback.h"
 #include "bench/memory.h"
 #include "bench/report.h"
+#include "bench/spatial.h"
 #include "bench/version.h"
 
 namespace {
@@ -23,7 +24,7 @@ enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
 constexpr char kFooter[] =
     R"(Configuration: every option is also an environment variable (--delay-ms = TESSERA_BENCH_DELAY_MS) and a key
-of the --config file, under [loopback], [culling] or [memory]. Flags win over the file, the file over the environment.
+of the --config file, under [loopback], [culling], [memory] or [spatial]. Flags win over the file, the file over the environment.
 
 Exit codes: 0 done, 1 the run failed, 2 wrong usage.)";
 
@@ -47,6 +48,11 @@ constexpr char kMemoryFooter[] = R"(Examples:
   tessera-bench memory --frames 0 --json speed.json
   tessera-bench memory --patches 0 --scene sponza.glb --path sponza_1.csv --server-fps 60
   tessera-bench memory --patches 0 --scene robot_lab.glb --path robot_lab_3.csv --atlas 2048x1024 --json lab.json)";
+
+constexpr char kSpatialFooter[] = R"(Examples:
+  tessera-bench spatial --report report
+  tessera-bench spatial --scene sponza.glb --path sponza_1.csv --seconds 10 --json spatial.json --report report
+  tessera-bench spatial --size 960x540 --atlas 2048x2048 --server-fps 0.5)";
 
 template <class Settings>
 std::string command_line(std::string command, const Settings& settings) {
@@ -146,6 +152,33 @@ int run_memory(const bench::MemorySettings& settings) {
   return written.ok() ? kOk : report_failure(written);
 }
 
+int run_spatial(const bench::SpatialSettings& settings) {
+  const SteadyClock clock;
+  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
+  StatusOr<bench::SpatialResult> result = bench::run_spatial(settings, progress);
+  if (!result.ok()) return report_failure(result.status());
+  result->command =
+      absl::StrFormat("%s --eye-distance-mm=%g", command_line("tessera-bench spatial", settings.common),
+                      settings.eye_distance_mm);
+  std::cout << absl::StrFormat("%-16s %-9s %10s %10s %8s %8s %8s %8s %9s\n", "method", "bias", "samples",
+                               "per pixel", "saved", "to mono", "mssim", "center", "holes");
+  for (const bench::SpatialRow& row : result->rows) {
+    std::cout << absl::StrFormat("%-16s %-9s %10.0f %10.3f %7.1f%% %8.3f %8.4f %8.4f %8.4f%%\n",
+                                 row.method.name, row.method.bias_name(), row.samples, row.per_pixel,
+                                 100 * (1 - row.per_pixel), row.to_mono, row.mssim, row.mssim_center,
+                                 100 * row.holes);
+  }
+  if (!settings.common.json.empty()) {
+    const Status written = bench::write_file(settings.common.json, bench::to_json(*result).dump(1) + "\n");
+    if (!written.ok()) return report_failure(written);
+  }
+  if (settings.common.report.empty()) return kOk;
+  const Status written = bench::write_spatial_report(settings.common.report, *result);
+  if (!written.ok()) return report_failure(written);
+  std::cerr << "report: " << settings.common.report << "/spatial.html" << std::endl;
+  return kOk;
+}
+
 int run_report(const std::string& folder) {
   const Status written = bench::write_report(folder);
   if (!written.ok()) return report_failure(written);
@@ -185,6 +218,24 @@ int main(int argc, char** argv) {
   memory->footer(kMemoryFooter);
   memory->fallthrough();
 
+  CLI::App* spatial =
+      app.add_subcommand("spatial", "samples and error of stereo, foveation, lenses and upsampling");
+  bench::SpatialSettings spatial_settings = bench::default_spatial_settings();
+  bench::add_options(*spatial, spatial_settings.common, bench::spatial_options());
+  spatial->add_option("--eye-distance-mm", spatial_settings.eye_distance_mm, "between the two eyes")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->envname("TESSERA_BENCH_EYE_DISTANCE_MM")
+      ->group("Client")
+      ->capture_default_str();
+  std::vector<std::string> methods;
+  for (const bench::SpatialCase& method : bench::spatial_cases()) methods.push_back(method.name);
+  spatial->add_option("--methods", spatial_settings.methods, "which to measure; default: all")
+      ->check(CLI::IsMember(methods))
+      ->delimiter(',')
+      ->group("Server");
+  spatial->footer(kSpatialFooter);
+  spatial->fallthrough();
+
   CLI::App* report = app.add_subcommand("report", "one page from all runs in a folder");
   std::string folder;
   report->add_option("folder", folder, "where `loopback --report` left its runs")
@@ -201,4 +252,7 @@ int main(int argc, char** argv) {
   if (loopback->parsed()) return run_loopback(settings);
   if (memory->parsed()) return run_memory(memory_settings);
   return culling->parsed() ? run_culling(culling_settings) : run_report(folder);
+
+  if (culling->parsed()) return run_culling(culling_settings);
+  return spatial->parsed() ? run_spatial(spatial_settings) : run_report(folder);
 }

@@ -11,16 +11,6 @@
 namespace tessera::bench {
 namespace {
 
-server::SessionSettings session_settings(const LoopbackSettings& s) {
-  server::SessionSettings out;
-  out.client_view = client_view(s);
-  out.layout = atlas::layout_settings(s.layout, s.atlas.width, s.atlas.height);
-  out.prediction.mode = s.pvs == Prediction::none ? pvs::PredictionMode::none : pvs::PredictionMode::linear;
-  out.rate.bitrate_bps = s.bitrate_mbps * 1e6;
-  out.rate.frames_per_second = s.server_fps;
-  return out;
-}
-
 // Copies device images to the CPU through one reused buffer.
 class ImageReader {
  public:
@@ -55,6 +45,16 @@ struct Snapshot {
 };
 
 }  // namespace
+
+server::SessionSettings session_settings(const LoopbackSettings& s) {
+  server::SessionSettings out;
+  out.client_view = client_view(s);
+  out.layout = atlas::layout_settings(s.layout, s.atlas.width, s.atlas.height);
+  out.prediction.mode = s.pvs == Prediction::none ? pvs::PredictionMode::none : pvs::PredictionMode::linear;
+  out.rate.bitrate_bps = s.bitrate_mbps * 1e6;
+  out.rate.frames_per_second = s.server_fps;
+  return out;
+}
 
 struct ShadingStreamer::Impl {
   std::shared_ptr<server::SharedScene> scene;
@@ -137,11 +137,16 @@ ShadingStreamer::~ShadingStreamer() = default;
 
 StatusOr<std::unique_ptr<ShadingStreamer>> ShadingStreamer::create(std::shared_ptr<server::SharedScene> scene,
                                                                    const LoopbackSettings& settings) {
+  return create(std::move(scene), settings, session_settings(settings));
+}
+
+StatusOr<std::unique_ptr<ShadingStreamer>> ShadingStreamer::create(std::shared_ptr<server::SharedScene> scene,
+                                                                   const LoopbackSettings& settings,
+                                                                   const server::SessionSettings& session) {
   auto impl = std::make_unique<Impl>();
   impl->scene = scene;
   impl->split = settings.split;
   impl->client = client_view(settings);
-  const server::SessionSettings session = session_settings(settings);
   TESSERA_ASSIGN_OR_RETURN(impl->session, server::Session::create(scene, session));
   TESSERA_ASSIGN_OR_RETURN(impl->core, client::ClientCore::create());
   const client::DisplaySettings display{.width = settings.size.width, .height = settings.size.height};

@@ -15,10 +15,17 @@
 
 namespace tessera::bench {
 
+// What a server makes of the settings.
+server::SessionSettings session_settings(const LoopbackSettings& settings);
+
 class ShadingStreamer final : public Streamer {
  public:
   static StatusOr<std::unique_ptr<ShadingStreamer>> create(std::shared_ptr<server::SharedScene> scene,
                                                            const LoopbackSettings& settings);
+  // With a session other than session_settings() has it; its atlas and view have the settings' sizes.
+  static StatusOr<std::unique_ptr<ShadingStreamer>> create(std::shared_ptr<server::SharedScene> scene,
+                                                           const LoopbackSettings& settings,
+                                                           const server::SessionSettings& session);
   ~ShadingStreamer() override;
 
   std::string name() const override { return "tessera"; }

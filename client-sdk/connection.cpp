@@ -280,8 +280,8 @@ Connection::~Connection() {
   impl_->decoder.join();
 }
 
-void Connection::send_pose(const TimedPose& pose) {
-  const transport::SequencedPose sequenced{impl_->pose_sequence++, pose, impl_->clock.now()};
+void Connection::send_pose(const TimedPose& pose, const std::optional<vec3>& gaze) {
+  const transport::SequencedPose sequenced{impl_->pose_sequence++, pose, impl_->clock.now(), gaze};
   if (!impl_->media->send_pose(sequenced))
     (void)impl_->meta->send(FrameType::pose, transport::encode(sequenced));
 }

@@ -41,8 +41,9 @@ class Connection {
                                                        const Clock& clock);
   ~Connection();  // says bye
 
-  // Newest wins; `pose.time_ns` on this side's clock, increasing.
-  void send_pose(const TimedPose& pose);
+  // Newest wins; `pose.time_ns` on this side's clock, increasing. `gaze`: where the eyes look, a unit vector
+  // in the head's axes; none: straight ahead.
+  void send_pose(const TimedPose& pose, const std::optional<vec3>& gaze = {});
   // See ClientCore::take_newest(). Counts as the moment at which drawing begins.
   const Pair* take_newest();
   // The moment at which a pair's first picture was shown. The server predicts by it. All that is known of

@@ -28,9 +28,9 @@ Status Session::status() const {
   return failure_;
 }
 
-bool Session::send_pose(const TimedPose& pose) {
+bool Session::send_pose(const TimedPose& pose, const std::optional<vec3>& gaze) {
   Connection* standing = connection();
-  if (standing != nullptr) standing->send_pose(pose);
+  if (standing != nullptr) standing->send_pose(pose, gaze);
   return standing != nullptr;
 }
 

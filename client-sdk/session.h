@@ -33,7 +33,7 @@ class Session {
   ~Session();
 
   // False while it connects: the pose is ignored. See Connection::send_pose().
-  bool send_pose(const TimedPose& pose);
+  bool send_pose(const TimedPose& pose, const std::optional<vec3>& gaze = {});
   // The next event, in this order: connecting; streaming; the first picture; frames, of which a newer one may
   // stand for several; lost, which is the last and may come at any place.
   std::optional<SessionEvent> poll_event();

@@ -205,4 +205,18 @@ std::vector<View> predict_views(std::span<const TimedPose> history, TimeNs now_n
   return views;
 }
 
+std::vector<View> predict_views(std::span<const TimedPose> history, TimeNs now_ns, const View& client_view,
+                                std::span<const Eye> eyes, const PredictionSettings& settings) {
+  std::vector<View> views;
+  for (const Eye& eye : eyes) {
+    View seen = client_view;
+    seen.fov = eye.fov;
+    for (View& view : predict_views(history, now_ns, seen, settings)) {
+      view.pose = compose(view.pose, eye.in_head);
+      views.push_back(view);
+    }
+  }
+  return views;
+}
+
 }  // namespace tessera::pvs

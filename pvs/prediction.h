@@ -34,6 +34,11 @@ struct PredictionSettings {
 std::vector<View> predict_views(std::span<const TimedPose> history, TimeNs now_ns, const View& client_view,
                                 const PredictionSettings& settings);
 
+// The same for the eyes of a head, whose poses `history` holds: all views of the first eye, then as many of
+// the next, for the same times. Of `client_view` only the resolution counts, which is one eye's.
+std::vector<View> predict_views(std::span<const TimedPose> history, TimeNs now_ns, const View& client_view,
+                                std::span<const Eye> eyes, const PredictionSettings& settings);
+
 // How far ahead of `now_ns` its views are, for a newest pose of that moment.
 std::vector<DurationNs> prediction_times(const PredictionSettings& settings);
 

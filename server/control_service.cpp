@@ -1,5 +1,7 @@
 #include "server/control_service.h"
 
+#include <google/protobuf/util/message_differencer.h>
+
 #include <algorithm>
 #include <chrono>
 #include <utility>
@@ -13,6 +15,8 @@
 
 namespace tessera::server {
 namespace {
+
+using google::protobuf::util::MessageDifferencer;
 
 constexpr uint32_t kFramesIntervalMs = 50;  // of frame records
 
@@ -40,6 +44,26 @@ StatusOr<transport::PeerAddress> caller_address(const std::string& peer, uint16_
   return transport::peer_address({*address, port});
 }
 
+Status read(const v1::Density& density, SessionSettings& settings) {
+  constexpr int kMaxPriorities = 256;
+  settings.density.foveation = static_cast<float>(density.foveation());
+  settings.density.barrel = density.barrel_distortion();
+  atlas::LevelSettings& levels = settings.layout.levels;
+  if (density.has_bias()) {
+    const auto bias = static_cast<float>(density.bias());
+    if (!(bias >= levels.min_bias && bias <= levels.max_bias))
+      return absl::InvalidArgumentError(absl::StrCat("settings.density.bias: is ", bias, ", must be ",
+                                                     levels.min_bias, " to ", levels.max_bias));
+    levels.min_bias = levels.max_bias = bias;
+  }
+  if (density.priorities_size() > kMaxPriorities)
+    return absl::InvalidArgumentError(absl::StrCat("settings.density.priorities: ", density.priorities_size(),
+                                                   " of them, the limit is ", kMaxPriorities));
+  for (const v1::ObjectPriority& priority : density.priorities())
+    settings.density.priorities.push_back({priority.node(), static_cast<float>(priority.density())});
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 StatusOr<SessionSettings> session_settings(v1::SessionSettings& s) {
@@ -57,6 +81,7 @@ StatusOr<SessionSettings> session_settings(v1::SessionSettings& s) {
                                                    " texels; both sides must be multiples of ",
                                                    std::max(side, 8u)));
   }
+  TESSERA_RETURN_IF_ERROR(read(s.density(), settings));
   settings.rate.bitrate_bps = mbps * 1e6;
   settings.rate.frames_per_second = fps;
   s.set_atlas_width(width);
@@ -93,8 +118,13 @@ void ControlService::open() {
 }
 
 StatusOr<SessionSettings> updated_settings(v1::SessionSettings& current, const v1::SessionSettings& wanted) {
-  v1::SessionSettings merged = current;
-  merged.MergeFrom(wanted);  // what is 0 stays
+  v1::SessionSettings merged = current, changes = wanted;
+  if (wanted.has_density() && !MessageDifferencer::Equals(wanted.density(), current.density()))
+    return absl::FailedPreconditionError(
+        "settings.density: a session keeps its own; create a session with another one and move the client to "
+        "it");
+  changes.clear_density();
+  merged.MergeFrom(changes);  // what is 0 stays
   TESSERA_ASSIGN_OR_RETURN(const SessionSettings settings, session_settings(merged));
   if (merged.atlas_width() != current.atlas_width() || merged.atlas_height() != current.atlas_height())
     return absl::FailedPreconditionError(absl::StrCat(
@@ -208,6 +238,8 @@ grpc::Status ControlService::CreateSession(grpc::ServerContext*, const v1::Creat
   if (!settings.ok()) return answer("CreateSession", settings.status());
   StatusOr<std::shared_ptr<SharedScene>> scene = scenes_.find(request->scene());
   if (!scene.ok()) return answer("CreateSession", scene.status());
+  const Status fits = atlas::Density::check((*scene)->scene(), settings->density);
+  if (!fits.ok()) return answer("CreateSession", fits);
   const StatusOr<SessionTicket> ticket = server_.create_session(renders(*std::move(scene)), *settings);
   if (!ticket.ok()) return answer("CreateSession", ticket.status());
   {

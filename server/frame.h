@@ -3,10 +3,12 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "atlas/density.h"
 #include "atlas/layout.h"
 #include "base/frame_number.h"
 #include "base/status.h"
@@ -21,7 +23,9 @@
 namespace tessera::server {
 
 struct SessionSettings {
-  View client_view;  // the client's resolution and field of view; its pose is ignored
+  View client_view;       // the client's resolution, of one eye; its pose is ignored
+  std::vector<Eye> eyes;  // of the client; none: one where the head is, with the client view's field
+  atlas::DensitySettings density;
   atlas::LayoutSettings layout;
   pvs::PredictionSettings prediction;  // horizon_ns is set for every frame
   pvs::VisibilitySettings visibility;
@@ -36,13 +40,14 @@ struct FrameInput {
   DurationNs round_trip_ns = 0;      // from a pose to the picture that shows its frame
   DurationNs interval_ns = 0;        // between frames, where it is longer than the rate says
   TimeNs scene_time_ns = 0;          // animation
+  std::optional<vec3> gaze;          // the newest, in the head's axes; none: straight ahead
   bool key_frame = false;
 };
 
 // Wall time of each stage.
 struct StageTimes {
-  double visibility_ms = 0, layout_ms = 0, shading_ms = 0, encode_ms = 0;
-  double total_ms() const { return visibility_ms + layout_ms + shading_ms + encode_ms; }
+  double visibility_ms = 0, density_ms = 0, layout_ms = 0, shading_ms = 0, encode_ms = 0;
+  double total_ms() const { return visibility_ms + density_ms + layout_ms + shading_ms + encode_ms; }
 };
 
 struct FrameStats {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 
 namespace tessera::server {
 namespace {
@@ -13,6 +14,16 @@ PlannedPass counted(const std::string& name, uint32_t count, const std::string& 
 
 PlannedPass needed(const std::string& name, bool is_needed, const std::string& what) {
   return {name, is_needed, (is_needed ? "the scene has " : "the scene has no ") + what};
+}
+
+PlannedPass density_pass(const atlas::DensitySettings& density) {
+  std::vector<std::string> causes;
+  if (density.foveation > 0) causes.push_back("foveation");
+  if (density.barrel) causes.push_back("barrel distortion");
+  if (const size_t count = density.priorities.size(); count > 0)
+    causes.push_back(absl::StrFormat("%d object priorities", count));
+  if (causes.empty()) return {"density", false, "the session has neither foveation, lens nor priorities"};
+  return {"density", true, "the session has " + absl::StrJoin(causes, ", ")};
 }
 
 }  // namespace
@@ -31,7 +42,7 @@ std::string FramePlan::to_string() const {
   return text;
 }
 
-FramePlan make_frame_plan(const scene::Features& features) {
+FramePlan make_frame_plan(const scene::Features& features, const atlas::DensitySettings& density) {
   FramePlan plan;
   plan.passes = {
       needed("object_transforms", features.rigid_animation, "moving objects"),
@@ -40,6 +51,7 @@ FramePlan make_frame_plan(const scene::Features& features) {
       {"culling", true, "always: meshlets against frustum and depth"},
       {"id_opaque", true, "always"},
       needed("id_masked", features.alpha_mask, "alpha-masked materials"),
+      density_pass(density),
       {"layout", true, "always: levels and block memory"},
       {"gather", true, "always: shades the placed samples"},
       needed("coverage", features.alpha_mask, "alpha-masked materials"),

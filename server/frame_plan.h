@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "atlas/density.h"
 #include "scene/scene.h"
 
 namespace tessera::server {
@@ -22,6 +23,6 @@ struct FramePlan {
   std::string to_string() const;  // one line a pass
 };
 
-FramePlan make_frame_plan(const scene::Features& features);
+FramePlan make_frame_plan(const scene::Features& features, const atlas::DensitySettings& density = {});
 
 }  // namespace tessera::server

@@ -178,7 +178,7 @@ Metrics::~Metrics() = default;
 
 void Metrics::on_rendered(const FrameStats& frame) {
   impl_->visibility.Observe(frame.times.visibility_ms / 1000);
-  impl_->layout.Observe(frame.times.layout_ms / 1000);
+  impl_->layout.Observe((frame.times.density_ms + frame.times.layout_ms) / 1000);
   impl_->shading.Observe(frame.times.shading_ms / 1000);
   impl_->encode.Observe(frame.times.encode_ms / 1000);
 }

@@ -8,6 +8,7 @@
 #include "codec/yuv_converter.h"
 #include "pvs/retention.h"
 #include "server/meta_builder.h"
+#include "server/viewers.h"
 
 namespace tessera::server {
 namespace {
@@ -43,6 +44,7 @@ struct Session::Impl {
   std::unique_ptr<scene::SceneInstant> instant;
   std::unique_ptr<pvs::Visibility> visibility;
   std::optional<pvs::Retention> retention;
+  std::unique_ptr<atlas::Density> density;  // only where the settings ask for it
   std::unique_ptr<atlas::Layout> layout;
   std::unique_ptr<shading::Gather> gather;
   std::unique_ptr<codec::YuvConverter> converter;
@@ -50,9 +52,12 @@ struct Session::Impl {
   std::optional<MetaBuilder> meta;
   bool first = true;
 
+  std::vector<Eye> eyes;
+  View client_view;  // of the eye that needs the most
   std::vector<View> views;
   std::vector<TimeNs> view_times;
   DurationNs horizon_ns = 0;
+  atlas::Viewers viewers;
   scene::VisiblePatches seen;
 
   Status set_up();
@@ -63,10 +68,16 @@ struct Session::Impl {
 
 Status Session::Impl::set_up() {
   gpu::Device& device = scene->device();
-  plan = make_frame_plan(scene->scene().features);
+  plan = make_frame_plan(scene->scene().features, settings.density);
+  eyes = eyes_of(settings);
+  client_view = finest_view(settings.client_view, eyes);
   TESSERA_ASSIGN_OR_RETURN(instant, scene::SceneInstant::create(device, scene->gpu_scene()));
   TESSERA_ASSIGN_OR_RETURN(visibility,
                            pvs::Visibility::create(device, scene->gpu_scene(), settings.visibility));
+  if (plan.includes("density")) {
+    TESSERA_ASSIGN_OR_RETURN(
+        density, atlas::Density::create(scene->scene(), settings.density, display_of(client_view, eyes)));
+  }
   TESSERA_ASSIGN_OR_RETURN(layout, atlas::create_layout(scene->scene(), settings.layout));
   const shading::GatherSettings gather_settings{settings.layout.width, settings.layout.height,
                                                 settings.gather_path};
@@ -87,17 +98,24 @@ Status Session::Impl::set_up() {
 Status Session::Impl::find_visible(const FrameInput& input, FrameStats& stats) {
   const TimedPose& newest = input.poses.back();
   pvs::PredictionSettings prediction = settings.prediction;
+  prediction.max_views /= static_cast<uint32_t>(eyes.size());  // they share the time that id buffers take
   horizon_ns =
       input.round_trip_ns + std::max(input.interval_ns, from_seconds(1.0 / settings.rate.frames_per_second));
   prediction.horizon_ns = horizon_ns;
-  views = pvs::predict_views(input.poses, newest.time_ns, settings.client_view, prediction);
+  views = pvs::predict_views(input.poses, newest.time_ns, client_view, eyes, prediction);
   view_times.clear();
-  for (const DurationNs ahead : pvs::prediction_times(prediction))
-    view_times.push_back(newest.time_ns + ahead);
+  for (size_t eye = 0; eye < eyes.size(); ++eye) {
+    for (const DurationNs ahead : pvs::prediction_times(prediction))
+      view_times.push_back(newest.time_ns + ahead);
+  }
+  if (density) {
+    const std::vector<View> heads = pvs::predict_views(input.poses, newest.time_ns, client_view, prediction);
+    viewers = viewers_of(views, heads, input.gaze);
+  }
 
   instant->set(input.scene_time_ns, newest.pose.position);
   TESSERA_RETURN_IF_ERROR(scene->lighting().update(*instant));
-  TESSERA_ASSIGN_OR_RETURN(seen, visibility->determine(*instant, views, settings.client_view));
+  TESSERA_ASSIGN_OR_RETURN(seen, visibility->determine(*instant, views, client_view));
   stats.predicted_views = static_cast<uint32_t>(views.size());
   stats.visible_patches = seen.size();
   stats.visibility = visibility->stats();
@@ -105,7 +123,7 @@ Status Session::Impl::find_visible(const FrameInput& input, FrameStats& stats) {
 }
 
 Status Session::Impl::shade(const Pose& pose, FrameStats& stats) {
-  View viewer = settings.client_view;
+  View viewer = client_view;
   viewer.pose = pose;
   gpu::Device& device = scene->device();
   gpu::Commands commands = device.begin();
@@ -158,8 +176,11 @@ StatusOr<Frame> Session::render(const FrameInput& input) {
 
   TESSERA_RETURN_IF_ERROR(impl_->find_visible(input, frame.stats));
   if (!impl_->retention) impl_->retention.emplace(input.round_trip_ns);
-  const scene::VisiblePatches kept = impl_->retention->update(frame.pose.time_ns, impl_->seen);
+  scene::VisiblePatches kept = impl_->retention->update(frame.pose.time_ns, impl_->seen);
   times.visibility_ms = watch.lap_ms();
+
+  if (impl_->density) impl_->density->scale(impl_->instant->instance_transforms(), impl_->viewers, kept);
+  times.density_ms = watch.lap_ms();
 
   const atlas::LayoutDelta delta =
       impl_->layout->update({kept, frame.pose.pose.position, impl_->instant->instance_transforms()});

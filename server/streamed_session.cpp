@@ -12,7 +12,7 @@ using transport::FrameType;
 
 constexpr DurationNs kHistoryNs = kNsPerSecond / 2;  // of poses, for prediction
 constexpr size_t kMaxPoses = 256;
-// Of a client's view: id buffers of this size are drawn and read back for every predicted one.
+// Of a client's eyes: id buffers of this size are drawn and read back for every predicted view.
 constexpr uint32_t kMaxViewPixels = 1u << 24;
 constexpr DurationNs kFirstRoundTripNs = 100 * kNsPerMs;  // assumed before the client has reported one
 constexpr DurationNs kMaxRoundTripNs = kNsPerSecond;
@@ -48,15 +48,15 @@ Status StreamedSession::admit(const transport::ClientSettings& client) {
     return absl::FailedPreconditionError(
         absl::StrCat("session ", id_, " has a client already; create a session for each client"));
   }
-  if (uint32_t{client.width} * client.height > kMaxViewPixels) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("a view of ", client.width, "x", client.height, " pixels; the limit is ", kMaxViewPixels,
-                     ": say hello with a smaller view, and draw as large as you like"));
+  if (client.eyes.size() * client.width * client.height > kMaxViewPixels) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        client.eyes.size(), " eyes with ", client.width, "x", client.height, " pixels each; the limit is ",
+        kMaxViewPixels, " together: say hello with a smaller view, and draw as large as you like"));
   }
   admitted_ = true;
   client_view_.width = client.width;
   client_view_.height = client.height;
-  client_view_.fov = client.fov;
+  eyes_ = client.eyes;
   return absl::OkStatus();
 }
 
@@ -78,6 +78,7 @@ void StreamedSession::on_closed(const Status& reason) {
   stats_.media += media_->remove_session(id_, std::string(reason.message()));
   connection_.reset();
   poses_.clear();
+  gaze_.reset();
   under_way_.clear();
   admitted_ = bound_ = false;
   restart_ = true;  // the next client knows nothing
@@ -103,6 +104,7 @@ void StreamedSession::on_pose(const transport::SequencedPose& pose) {
   std::erase_if(poses_, [&](const TimedPose& p) { return p.time_ns < pose.timed.time_ns - kHistoryNs; });
   if (poses_.size() == kMaxPoses) poses_.erase(poses_.begin());  // the times are the client's word
   poses_.push_back(pose.timed);
+  gaze_ = pose.gaze;
   newest_pose_sent_ns_ = pose.sent_ns;
   newest_pose_received_ns_ = clock_.now();
 }
@@ -197,7 +199,9 @@ StreamedSession::Work StreamedSession::take_work() {
   if (std::exchange(restart_, false)) renderer_.reset();
   return {.poses = poses_,
           .connection = connection_,
+          .gaze = gaze_,
           .client_view = client_view_,
+          .eyes = eyes_,
           .round_trip_ns = stats_.round_trip_ns,
           .pose_sent_ns = newest_pose_sent_ns_,
           .pose_received_ns = newest_pose_received_ns_,
@@ -270,6 +274,7 @@ Status StreamedSession::render() {
                                               .round_trip_ns = work.round_trip_ns,
                                               .interval_ns = interval_ns(record.server.render_begin),
                                               .scene_time_ns = record.scene_time,
+                                              .gaze = work.gaze,
                                               .key_frame = work.key_frame}));
   record.server.render_end = clock_.now();
   count(frame);
@@ -297,6 +302,7 @@ DurationNs StreamedSession::interval_ns(TimeNs begin) {
 Status StreamedSession::prepare(const Work& work) {
   SessionSettings settings = settings_;
   settings.client_view = work.client_view;
+  settings.eyes = work.eyes;
   settings.rate = work.rate;
   TESSERA_ASSIGN_OR_RETURN(renderer_, make_renderer_(settings));
   last_begin_ns_ = 0;
@@ -313,7 +319,7 @@ Status StreamedSession::send(const Work& work, const Frame& frame, FrameRecord r
   record.atlas_bytes = frame.atlas.bytes.size();
   record.meta_bytes = frame.meta.size();
   record.server.visibility = from_ms(times.visibility_ms);
-  record.server.layout = from_ms(times.layout_ms);
+  record.server.layout = from_ms(times.density_ms + times.layout_ms);
   record.server.shading = from_ms(times.shading_ms);
   record.server.encode = from_ms(times.encode_ms);
   record.server.sent = record.server.render_end;  // until it is known: the client may report before that

@@ -38,7 +38,7 @@ class StreamedSession {
  public:
   static constexpr size_t kMaxRecords = 1024;
 
-  // `settings.client_view` is replaced by what the client's hello says.
+  // `settings.client_view` and `eyes` are replaced by what the client's hello says.
   // `on_rendered` is called by the render thread after each frame, and must not block.
   using OnRendered = std::function<void(const FrameStats&)>;
   StreamedSession(transport::SessionId id, RendererFactory make_renderer, const SessionSettings& settings,
@@ -82,7 +82,9 @@ class StreamedSession {
   struct Work {  // what the render thread takes along
     std::vector<TimedPose> poses;
     std::shared_ptr<transport::MetaConnection> connection;
+    std::optional<vec3> gaze;
     View client_view;
+    std::vector<Eye> eyes;
     DurationNs round_trip_ns = 0;
     TimeNs pose_sent_ns = 0, pose_received_ns = 0, due_ns = 0;
     bool bound = false, key_frame = false;
@@ -114,7 +116,9 @@ class StreamedSession {
   mutable std::mutex mutex_;  // of all below
   std::shared_ptr<transport::MetaConnection> connection_;
   View client_view_;
+  std::vector<Eye> eyes_;
   std::vector<TimedPose> poses_;  // on the client's clock
+  std::optional<vec3> gaze_;      // of the newest
   TimeNs newest_pose_sent_ns_ = 0, newest_pose_received_ns_ = 0;
   std::map<FrameNumber, FrameRecord> under_way_;  // sent, and nothing heard of it yet
   std::deque<FrameRecord> records_;

@@ -1,6 +1,7 @@
 #include "transport/messages.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 
 #include "base/utf8.h"
@@ -59,11 +60,40 @@ void require(ByteReader& in, bool condition) {
   if (!condition) in.fail();
 }
 
-bool in_range(const ClientSettings& c) {
+bool in_range(const Eye& eye) {
   const auto tangent = [](float t) { return t >= -kMaxTangent && t <= kMaxTangent; };
+  const auto offset = [](double m) { return std::abs(m) <= kMaxEyeOffsetM; };
+  const dvec3& at = eye.in_head.position;
+  const Fov& fov = eye.fov;
+  return offset(at.x) && offset(at.y) && offset(at.z) && tangent(fov.left) && tangent(fov.right) &&
+         tangent(fov.down) && tangent(fov.up) && fov.left < fov.right && fov.down < fov.up;
+}
+
+bool in_range(const ClientSettings& c) {
   return c.width >= 1 && c.width <= kMaxSide && c.height >= 1 && c.height <= kMaxSide &&
-         tangent(c.fov.left) && tangent(c.fov.right) && tangent(c.fov.down) && tangent(c.fov.up) &&
-         c.fov.left < c.fov.right && c.fov.down < c.fov.up && c.display_hz >= 1 && c.display_hz <= 1000;
+         std::ranges::all_of(c.eyes, [](const Eye& eye) { return in_range(eye); }) && c.display_hz >= 1 &&
+         c.display_hz <= 1000;
+}
+
+void write_eyes(std::span<const Eye> eyes, ByteWriter& w) {
+  w.u8(static_cast<uint8_t>(eyes.size()));
+  for (const Eye& eye : eyes) {
+    for (int axis = 0; axis < 3; ++axis) w.f32(static_cast<float>(eye.in_head.position[axis]));
+    write_orientation(eye.in_head.orientation, w);
+    for (const float tangent : {eye.fov.left, eye.fov.right, eye.fov.down, eye.fov.up}) w.f32(tangent);
+  }
+}
+
+std::vector<Eye> read_eyes(ByteReader& in) {
+  const size_t count = in.u8();
+  require(in, count >= 1 && count <= kMaxEyes);
+  std::vector<Eye> eyes(in.ok() ? count : 0);
+  for (Eye& eye : eyes) {
+    for (int axis = 0; axis < 3; ++axis) eye.in_head.position[axis] = in.f32();
+    eye.in_head.orientation = read_orientation(in);
+    for (float* tangent : {&eye.fov.left, &eye.fov.right, &eye.fov.down, &eye.fov.up}) *tangent = in.f32();
+  }
+  return eyes;
 }
 
 template <class T>
@@ -81,8 +111,7 @@ Bytes encode(const Hello& m) {
   w.bytes(m.token);
   w.u16(m.client.width);
   w.u16(m.client.height);
-  for (float tangent : {m.client.fov.left, m.client.fov.right, m.client.fov.down, m.client.fov.up})
-    w.f32(tangent);
+  write_eyes(m.client.eyes, w);
   w.f32(m.client.display_hz);
   write_text(w, m.client.name, kMaxNameBytes);
   return out;
@@ -96,8 +125,7 @@ StatusOr<Hello> decode_hello(std::span<const uint8_t> payload) {
   read_array(in, m.token);
   m.client.width = in.u16();
   m.client.height = in.u16();
-  for (float* tangent : {&m.client.fov.left, &m.client.fov.right, &m.client.fov.down, &m.client.fov.up})
-    *tangent = in.f32();
+  m.client.eyes = read_eyes(in);
   m.client.display_hz = in.f32();
   m.client.name = read_text(in, kMaxNameBytes);
   require(in, in_range(m.client));

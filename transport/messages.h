@@ -21,12 +21,14 @@
 namespace tessera::transport {
 
 constexpr uint16_t kProtocolVersion = 1;
+constexpr size_t kMaxEyes = 2;
+constexpr double kMaxEyeOffsetM = 1;  // from the head, along each axis
 constexpr size_t kMaxNameBytes = 64, kMaxReasonBytes = 1024;
 
 // What the client draws.
 struct ClientSettings {
-  uint16_t width = 0, height = 0;  // pixels, 1..16384
-  Fov fov;                         // tangents within ±60; left < right, down < up
+  uint16_t width = 0, height = 0;  // pixels of one eye, 1..16384
+  std::vector<Eye> eyes{1};        // 1..kMaxEyes; tangents within ±60, left < right, down < up
   float display_hz = 0;            // 1..1000
   std::string name;                // of program and device, for logs; up to kMaxNameBytes
 };

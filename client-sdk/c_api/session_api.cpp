@@ -1,5 +1,7 @@
 // Sessions, events, poses and frames in C.
 #include <algorithm>
+#include <optional>
+#include <vector>
 
 #include "base/utf8.h"
 #include "client-sdk/c_api/handles.h"
@@ -20,6 +22,41 @@ TesseraResult null_session() {
   return failure(TESSERA_ERROR_HANDLE_INVALID, "the session is NULL");
 }
 
+StatusOr<std::vector<Eye>> eyes_of(const TesseraSessionCreateInfo& info) {
+  if (info.next == nullptr) {
+    TESSERA_ASSIGN_OR_RETURN(const Fov fov, fov_of(info.fov, "info->fov"));
+    return std::vector<Eye>{{.fov = fov}};
+  }
+  const auto* stereo = static_cast<const TesseraStereoInfo*>(info.next);
+  TESSERA_RETURN_IF_ERROR(check_struct(stereo, TESSERA_TYPE_STEREO_INFO, "info->next"));
+  std::vector<Eye> eyes;
+  for (int i = 0; i < TESSERA_MAX_VIEWS; ++i) {
+    Eye& eye = eyes.emplace_back();
+    const std::string name = absl::StrCat("stereo->eyes[", i, "]");
+    TESSERA_ASSIGN_OR_RETURN(eye.in_head, pose_of(stereo->eyes[i], name.c_str()));
+    TESSERA_ASSIGN_OR_RETURN(eye.fov, fov_of(stereo->fovs[i], absl::StrCat("stereo->fovs[", i, "]").c_str()));
+    for (int axis = 0; axis < 3; ++axis) {
+      if (std::abs(eye.in_head.position[axis]) > transport::kMaxEyeOffsetM)
+        return absl::InvalidArgumentError(absl::StrCat(name, ".position has ", eye.in_head.position[axis],
+                                                       "; eyes lie within ±1 m of the head"));
+    }
+  }
+  return eyes;
+}
+
+// None without the struct.
+StatusOr<std::optional<vec3>> gaze_of(const TesseraPoseInfo& info) {
+  if (info.next == nullptr) return std::optional<vec3>();
+  const auto* given = static_cast<const TesseraGaze*>(info.next);
+  TESSERA_RETURN_IF_ERROR(check_struct(given, TESSERA_TYPE_GAZE, "info->next"));
+  const vec3 gaze(given->direction[0], given->direction[1], given->direction[2]);
+  const float length = glm::length(gaze);
+  if (!(length >= 0.5f && length <= 2))
+    return absl::InvalidArgumentError(
+        absl::StrCat("gaze->direction is a vector of length ", length, "; give one of length 1"));
+  return std::optional<vec3>(gaze / length);
+}
+
 StatusOr<transport::ClientSettings> client_settings(const TesseraSessionCreateInfo& info) {
   if (info.viewWidth - 1 >= kMaxViewSide || info.viewHeight - 1 >= kMaxViewSide)
     return absl::InvalidArgumentError(absl::StrCat("info->viewWidth x viewHeight is ", info.viewWidth, "x",
@@ -27,7 +64,7 @@ StatusOr<transport::ClientSettings> client_settings(const TesseraSessionCreateIn
   if (!(info.displayRate >= 1 && info.displayRate <= 1000))
     return absl::InvalidArgumentError(
         absl::StrCat("info->displayRate is ", info.displayRate, " Hz; it must be 1..1000"));
-  TESSERA_ASSIGN_OR_RETURN(const Fov fov, fov_of(info.fov, "info->fov"));
+  TESSERA_ASSIGN_OR_RETURN(std::vector<Eye> eyes, eyes_of(info));
   const std::string name = info.applicationName == nullptr ? "" : info.applicationName;
   if (name.size() > transport::kMaxNameBytes)
     return absl::InvalidArgumentError(
@@ -36,7 +73,7 @@ StatusOr<transport::ClientSettings> client_settings(const TesseraSessionCreateIn
     return absl::InvalidArgumentError("info->applicationName is not UTF-8");
   return transport::ClientSettings{.width = static_cast<uint16_t>(info.viewWidth),
                                    .height = static_cast<uint16_t>(info.viewHeight),
-                                   .fov = fov,
+                                   .eyes = std::move(eyes),
                                    .display_hz = info.displayRate,
                                    .name = name};
 }
@@ -49,7 +86,7 @@ StatusOr<DurationNs> connect_timeout(const TesseraSessionCreateInfo& info) {
 }
 
 StatusOr<TesseraSession> create_session(const TesseraSessionCreateInfo* info) {
-  TESSERA_RETURN_IF_ERROR(check_struct(info, TESSERA_TYPE_SESSION_CREATE_INFO, "info"));
+  TESSERA_RETURN_IF_ERROR(check_type(info, TESSERA_TYPE_SESSION_CREATE_INFO, "info"));
   const uint32_t version = info->apiVersion;
   if (version != TESSERA_API_VERSION)  // while the major version is 0
     return absl::UnimplementedError(absl::StrFormat(
@@ -161,17 +198,19 @@ TesseraResult tesseraPollEvent(TesseraSession session, TesseraEvent* event) {
 TesseraResult tesseraSendPose(TesseraSession session, const TesseraPoseInfo* info) {
   return guarded([&] {
     if (session == nullptr) return null_session();
-    TESSERA_FAIL_IF_ERROR(check_struct(info, TESSERA_TYPE_POSE_INFO, "info"));
+    TESSERA_FAIL_IF_ERROR(check_type(info, TESSERA_TYPE_POSE_INFO, "info"));
     const auto pose = pose_of(info->pose, "info->pose");
     TESSERA_FAIL_IF_ERROR(pose.status());
+    const auto gaze = gaze_of(*info);
+    TESSERA_FAIL_IF_ERROR(gaze.status());
     TESSERA_FAIL_IF_ERROR(check_time(info->predictedDisplayTime, "info->predictedDisplayTime"));
     if (const Status lost = session->session.status(); !lost.ok())
       return failure(why_lost(lost), lost.message());
     if (!advance(session->newest_pose_time, info->predictedDisplayTime))
       return failure(TESSERA_ERROR_VALIDATION,
                      "info->predictedDisplayTime is not later than that of the pose before");
-    return session->session.send_pose({info->predictedDisplayTime, *pose}) ? TESSERA_SUCCESS
-                                                                           : TESSERA_NOT_STREAMING;
+    return session->session.send_pose({info->predictedDisplayTime, *pose}, *gaze) ? TESSERA_SUCCESS
+                                                                                  : TESSERA_NOT_STREAMING;
   });
 }
 

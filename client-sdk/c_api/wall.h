@@ -34,7 +34,7 @@ TesseraResult guarded(const Body& body) noexcept {
   }
 }
 
-// A struct that an app gave: not null and of its type. With `Extension`, that may be its only extension.
+// A struct that an app gave: not null and of its type; of check_struct(), also without an extension.
 template <typename Struct>
 Status check_type(const Struct* given, TesseraStructureType type, const char* name) {
   if (given == nullptr) return absl::InvalidArgumentError(absl::StrCat(name, " is NULL"));

@@ -30,12 +30,14 @@ bool is_starting(const Status& status) {
                                          absl::StrContains(status.message(), "still loading"));
 }
 
-Status create_session(v1::Control::Stub& control, const std::string& scene, v1::Ticket& ticket) {
+Status create_session(v1::Control::Stub& control, const std::string& scene, const v1::SessionSettings& wanted,
+                      v1::Ticket& ticket) {
   constexpr std::chrono::milliseconds kRetryInterval{250};
   constexpr std::chrono::seconds kLoadTime{120};
   const auto start = std::chrono::steady_clock::now();
   v1::CreateSessionRequest request;
   request.set_scene(scene);
+  *request.mutable_settings() = wanted;
   while (true) {
     grpc::ClientContext context;
     limit(context);
@@ -88,14 +90,15 @@ StatusOr<std::string> token(const ControlSettings& settings) {
 }  // namespace
 
 StatusOr<std::unique_ptr<ControlledSession>> ControlledSession::create(const ControlSettings& settings,
-                                                                       const std::string& scene) {
+                                                                       const std::string& scene,
+                                                                       const v1::SessionSettings& wanted) {
   TESSERA_ASSIGN_OR_RETURN(const auto channel_credentials, credentials(settings));
   std::unique_ptr<ControlledSession> session(new ControlledSession);
   TESSERA_ASSIGN_OR_RETURN(const std::string control_token, token(settings));
   session->stub_ =
       v1::Control::NewStub(control_channel(settings.endpoint, channel_credentials, control_token));
   v1::Ticket made;
-  if (const Status status = create_session(*session->stub_, scene, made); !status.ok())
+  if (const Status status = create_session(*session->stub_, scene, wanted, made); !status.ok())
     return absl::Status(status.code(),
                         absl::StrCat("control at ", settings.endpoint, ": ", status.message()));
   session->id_ = made.session();

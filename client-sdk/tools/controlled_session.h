@@ -22,7 +22,8 @@ struct ControlSettings {
 class ControlledSession {
  public:
   static StatusOr<std::unique_ptr<ControlledSession>> create(const ControlSettings& settings,
-                                                             const std::string& scene);
+                                                             const std::string& scene,
+                                                             const v1::SessionSettings& wanted = {});
   // Deletes it, unless it was kept.
   ~ControlledSession();
 

@@ -31,6 +31,7 @@ constexpr char kFooter[] = R"(Examples:
   tessera-client --scene hall --position 0 1.6 0 --seconds 5 --out pictures
   tessera-client --control 127.0.0.1:7310 --scene sponza --path sponza_1.csv --width 1280 --height 720 --save-every 10 --json run.json
   tessera-client --scene hall --out hall.mp4 --trace hall-trace.json
+  tessera-client --scene hall --stereo --foveation 1 --fov-y 90 --out pictures
   tessera-client --control render.example:7310 --ca ca.pem --control-token-file token --scene hall --print-ticket
   tessera-client --ticket tessera://127.0.0.1:7311/TOKEN --out pictures
 
@@ -39,7 +40,9 @@ Exit codes: 0 done, 1 the stream failed, 2 wrong usage.)";
 struct Settings {
   client::ControlSettings control;
   std::string scene, ticket, path, out, json, frames_csv, trace;
-  bool print_ticket = false;
+  bool print_ticket = false, stereo = false;
+  double eye_distance_mm = 63, foveation = 0;
+  std::optional<double> bias;
   std::vector<double> position;
   double seconds = 5, fps = 60, fov_y_deg = 60;
   uint32_t width = 960, height = 540, save_every = 30;
@@ -59,10 +62,35 @@ View view_of(const Settings& s) {
   return view;
 }
 
+std::vector<Eye> eyes_of(const Settings& s) {
+  const Fov fov = view_of(s).fov;
+  if (!s.stereo) return {{.fov = fov}};
+  const double half_m = 0.5e-3 * s.eye_distance_mm;
+  return {{.in_head = {.position = {-half_m, 0, 0}}, .fov = fov},
+          {.in_head = {.position = {half_m, 0, 0}}, .fov = fov}};
+}
+
+// What a session is asked for; zeros leave the daemon its defaults.
+v1::SessionSettings session_settings(const Settings& s) {
+  v1::SessionSettings wanted;
+  wanted.mutable_density()->set_foveation(s.foveation);
+  if (s.bias) wanted.mutable_density()->set_bias(*s.bias);
+  return wanted;
+}
+
+Image8 beside(const Image8& left, const Image8& right) {
+  Image8 both(left.width + right.width, left.height);
+  for (uint32_t y = 0; y < left.height; ++y) {
+    std::copy_n(left.at(0, y), size_t{4} * left.width, both.at(0, y));
+    std::copy_n(right.at(0, y), size_t{4} * right.width, both.at(left.width, y));
+  }
+  return both;
+}
+
 transport::ClientSettings client_settings(const Settings& s) {
   return {.width = static_cast<uint16_t>(s.width),
           .height = static_cast<uint16_t>(s.height),
-          .fov = view_of(s).fov,
+          .eyes = eyes_of(s),
           .display_hz = static_cast<float>(s.fps),
           .name = "tessera-client"};
 }
@@ -144,7 +172,7 @@ class Viewer {
       TESSERA_RETURN_IF_ERROR(display_.set_atlas(codec::view_of(next->atlas)));
     }
     if (!pair_) return absl::OkStatus();
-    TESSERA_ASSIGN_OR_RETURN(const Image8 image, display_.draw(view_));
+    TESSERA_ASSIGN_OR_RETURN(const Image8 image, draw());
     const TimeNs displayed = clock_.now();
     if (next) {
       connection_.report_displayed(next->frame, displayed);
@@ -153,6 +181,19 @@ class Viewer {
     if (writer_) TESSERA_RETURN_IF_ERROR(save(image, displayed));
     ++totals_.displayed;
     return absl::OkStatus();
+  }
+
+  // Two eyes lie side by side.
+  StatusOr<Image8> draw() {
+    std::vector<View> views;
+    for (const Eye& eye : eyes_of(s_)) {
+      View& view = views.emplace_back(view_);
+      view.pose = compose(view_.pose, eye.in_head);
+    }
+    if (views.size() == 1) return display_.draw(views[0]);
+    TESSERA_ASSIGN_OR_RETURN(const client::Display::StereoImage eyes,
+                             display_.draw_stereo(views[0], views[1]));
+    return beside(eyes.left, eyes.right);
   }
 
   Status save(const Image8& image, TimeNs displayed) {
@@ -180,7 +221,8 @@ class Viewer {
 };
 
 Status print_ticket(const Settings& s) {
-  TESSERA_ASSIGN_OR_RETURN(const auto session, client::ControlledSession::create(s.control, s.scene));
+  TESSERA_ASSIGN_OR_RETURN(const auto session,
+                           client::ControlledSession::create(s.control, s.scene, session_settings(s)));
   session->keep();
   std::cout << client::to_string(session->ticket()) << std::endl;
   std::string tls = " -plaintext";
@@ -218,7 +260,8 @@ StatusOr<nlohmann::json> view(const Settings& s) {
   if (!s.ticket.empty()) {
     TESSERA_ASSIGN_OR_RETURN(ticket, client::parse_ticket(s.ticket));
   } else {
-    TESSERA_ASSIGN_OR_RETURN(session, client::ControlledSession::create(s.control, s.scene));
+    TESSERA_ASSIGN_OR_RETURN(session,
+                             client::ControlledSession::create(s.control, s.scene, session_settings(s)));
     ticket = session->ticket();
     if (!s.frames_csv.empty() || !s.trace.empty()) session->record_frames();
   }
@@ -296,6 +339,21 @@ int main(int argc, char** argv) {
   app.add_option("--width", s.width, "pixels")->check(CLI::Range(2, 8192))->capture_default_str();
   app.add_option("--height", s.height, "pixels")->check(CLI::Range(2, 8192))->capture_default_str();
   app.add_option("--fov-y", s.fov_y_deg, "degrees")->check(CLI::Range(1.0, 179.0))->capture_default_str();
+  app.add_flag("--stereo", s.stereo, "two eyes, of --width and --height each, side by side in pictures");
+  app.add_option("--eye-distance-mm", s.eye_distance_mm, "between them")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  app.add_option(
+         "--foveation", s.foveation,
+         "with --scene: shade for the eye's resolution away from the middle of the picture; 0: no, 1: as "
+         "an eye sees, up to 8 times coarser")
+      ->check(CLI::Range(0.0, 8.0))
+      ->needs(scene)
+      ->capture_default_str();
+  app.add_option("--bias", s.bias,
+                 "with --scene: 2^-BIAS samples a pixel; default: as many as the atlas has room for")
+      ->check(CLI::Range(-2.0, 16.0))
+      ->needs(scene);
   app.add_option("--out", s.out,
                  "folder for pictures (PNG), or a .mp4 file of all (by ffmpeg); none: write none");
   app.add_option("--save-every", s.save_every, "n-th displayed frame becomes a PNG")

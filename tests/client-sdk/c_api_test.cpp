@@ -120,6 +120,31 @@ TEST(CApi, WrongCreateInfosAreNamed) {
   expect(kWrong, "not UTF-8", [](Info& i) { i.applicationName = "caf\xe9"; });
 }
 
+TEST(CApi, WrongEyesAreNamed) {
+  const std::string ticket = "tessera://127.0.0.1:1/00112233445566778899aabbccddeeff";
+  const auto expect = [&](const std::string& word, const auto& change) {
+    auto info = create_info(ticket);
+    auto stereo = make<TesseraStereoInfo>();
+    for (int i = 0; i < 2; ++i) {
+      stereo.eyes[i] = {{0.03, 0, 0}, {0, 0, 0, 1}};
+      stereo.fovs[i] = kFov;
+    }
+    info.next = &stereo;
+    change(stereo);
+    TesseraSession session = nullptr;
+    EXPECT_EQ(tesseraCreateSession(&info, &session), TESSERA_ERROR_VALIDATION) << word;
+    EXPECT_EQ(session, nullptr);
+    EXPECT_THAT(last_error(), HasSubstr(word));
+  };
+  using Stereo = TesseraStereoInfo;
+  expect("info->next->type is 2 instead of 10", [](Stereo& s) { s.type = TESSERA_TYPE_POSE_INFO; });
+  expect("info->next->next", [](Stereo& s) { s.next = &s; });
+  expect("stereo->eyes[1].orientation", [](Stereo& s) { s.eyes[1].orientation[3] = 0; });
+  expect("stereo->eyes[0].position", [](Stereo& s) { s.eyes[0].position[2] = 1.5; });
+  expect("stereo->eyes[1].position", [](Stereo& s) { s.eyes[1].position[1] = NAN; });
+  expect("stereo->fovs[1]", [](Stereo& s) { s.fovs[1].right = -2; });
+}
+
 TEST(CApi, ARefusedConnectionIsLostAndNamesTheStep) {
   const std::string ticket = "tessera://127.0.0.1:1/00112233445566778899aabbccddeeff";
   tessera::Session session(create_info(ticket));
@@ -236,6 +261,24 @@ TEST_F(CApiSession, WrongPosesAreNamedAndChangeNothing) {
     EXPECT_THAT(last_error(), HasSubstr("displayTime is " + std::to_string(time)));
   }
   EXPECT_EQ(session.send_pose(kHead, now + 1), TESSERA_SUCCESS);
+
+  const auto gaze_fails = [&](const std::string& word, const TesseraGaze& gaze) {
+    auto info = make<TesseraPoseInfo>();
+    info.next = &gaze;
+    info.pose = kHead;
+    info.predictedDisplayTime = now + 100;
+    EXPECT_EQ(tesseraSendPose(session.get(), &info), TESSERA_ERROR_VALIDATION);
+    EXPECT_THAT(last_error(), HasSubstr(word));
+  };
+  auto gaze = make<TesseraGaze>();
+  gaze_fails("gaze->direction is a vector of length 0", gaze);
+  gaze.direction[1] = NAN;
+  gaze_fails("gaze->direction", gaze);
+  gaze.direction[1] = 0.7f;
+  gaze.type = TESSERA_TYPE_EVENT;
+  gaze_fails("info->next->type is 3 instead of 11", gaze);
+  gaze.type = TESSERA_TYPE_GAZE;
+  EXPECT_EQ(session.send_pose(kHead, now + 2, &gaze), TESSERA_SUCCESS);
 }
 
 TEST_F(CApiSession, DrawsWhatADisplayDrawsOfTheSamePair) {

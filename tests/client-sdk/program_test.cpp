@@ -75,6 +75,22 @@ TEST_F(Program, PrintsATicketThatItCanViewByItself) {
   EXPECT_EQ(run(viewer("")), 2);
 }
 
+TEST_F(Program, DrawsTwoEyesSideBySide) {
+  start({});
+  ASSERT_EQ(run(viewer("--scene hall --stereo --foveation 1 --bias 0 --out " + file("pictures"))), 0)
+      << errors_;
+  const std::string png = text_of(file("pictures/000000.png"));
+  ASSERT_GT(png.size(), 24u);
+  const auto number = [&](size_t at) {
+    return static_cast<uint8_t>(png[at + 2]) * 256 + static_cast<uint8_t>(png[at + 3]);
+  };
+  EXPECT_EQ(number(16), 128) << "the width, of two eyes";
+  EXPECT_EQ(number(20), 48);
+  EXPECT_EQ(run(viewer("--scene hall --foveation 9")), 2);
+  EXPECT_EQ(run(viewer("--ticket tessera://127.0.0.1:1/12 --foveation 1")), 2)
+      << "whoever made it has decided that";
+}
+
 TEST_F(Program, WritesVideo) {
   start({});
   ASSERT_EQ(run(viewer("--scene hall --fps 30 --out " + file("hall.mp4") + " --json " + file("run.json"))), 0)

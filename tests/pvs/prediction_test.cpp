@@ -241,5 +241,26 @@ TEST(Prediction, AsymmetricFrustaStayAsymmetric) {
               std::atan(-0.5f) - std::atan(views[0].fov.left), 2e-3);
 }
 
+// A head that turns carries its eyes along on a circle.
+TEST(Prediction, EyesMoveWithTheirHead) {
+  const std::vector<Eye> eyes{
+      {.in_head = {{-0.1, 0, 0}, glm::angleAxis(0.2, dvec3(0, 1, 0))}, .fov = {-1, 0.8f, -1, 1}},
+      {.in_head = {{0.1, 0.02, 0}, {}}, .fov = {-0.8f, 1, -1, 1}}};
+  const auto history = motion({1, 0, 0}, {0, 2, 0});
+  const auto heads = predict_views(history, kStart, client_view(), settings(100));
+  const auto views = predict_views(history, kStart, client_view(), eyes, settings(100));
+  ASSERT_EQ(views.size(), 2 * heads.size());
+  for (size_t e = 0; e < eyes.size(); ++e) {
+    for (size_t i = 0; i < heads.size(); ++i) {
+      const View& view = views[e * heads.size() + i];
+      const Pose &head = heads[i].pose, &eye = eyes[e].in_head;
+      expect_pose(view.pose,
+                  {head.position + head.orientation * eye.position, head.orientation * eye.orientation});
+      EXPECT_LE(view.fov.left, eyes[e].fov.left);
+      EXPECT_GE(view.fov.right, eyes[e].fov.right);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tessera::pvs

@@ -62,12 +62,14 @@ class DaemonTest : public testing::Test {
     v1::UnloadSceneResponse response;
     return control_->UnloadScene(&context, request, &response);
   }
-  grpc::Status create(const std::string& scene, v1::Ticket* ticket, uint32_t atlas_width = 512) {
+  grpc::Status create(const std::string& scene, v1::Ticket* ticket, uint32_t atlas_width = 512,
+                      const v1::Density& density = {}) {
     grpc::ClientContext context;
     v1::CreateSessionRequest request;
     request.set_scene(scene);
     request.mutable_settings()->set_atlas_width(atlas_width);
     request.mutable_settings()->set_atlas_height(256);
+    *request.mutable_settings()->mutable_density() = density;
     return control_->CreateSession(&context, request, ticket);
   }
   grpc::Status update(uint64_t session, const v1::SessionSettings& settings, v1::Session* out = nullptr) {
@@ -100,7 +102,7 @@ class DaemonTest : public testing::Test {
     EXPECT_EQ(ticket.token().size(), settings.token.size());
     std::copy(ticket.token().begin(), ticket.token().end(), settings.token.begin());
     settings.client = {
-        .width = 160, .height = 90, .fov = Fov::symmetric(1.0f, 16.0f / 9.0f), .display_hz = 60};
+        .width = 160, .height = 90, .eyes = {{.fov = Fov::symmetric(1.0f, 16.0f / 9.0f)}}, .display_hz = 60};
     return settings;
   }
   StatusOr<std::unique_ptr<client::Connection>> connect(const v1::Ticket& ticket) {

@@ -191,6 +191,43 @@ TEST_F(DaemonTest, RefusalsNameWhatIsWrong) {
   expect_refused(remove(99), grpc::StatusCode::NOT_FOUND, "99");
 }
 
+TEST_F(DaemonTest, ADensityIsCheckedAgainstTheSceneAndKept) {
+  start({.scenes = {"hall=gallery:0"}});
+  v1::Ticket ticket;
+  const auto with = [](const std::string& node, double density, double bias) {
+    v1::Density wanted;
+    wanted.set_foveation(1);
+    wanted.set_bias(bias);
+    v1::ObjectPriority& priority = *wanted.add_priorities();
+    priority.set_node(node);
+    priority.set_density(density);
+    return wanted;
+  };
+  const auto kInvalid = grpc::StatusCode::INVALID_ARGUMENT;
+  expect_refused(create("hall", &ticket, 512, with("chair", 2, 0)), kInvalid, "`chair`");
+  expect_refused(create("hall", &ticket, 512, with("root", 65, 0)), kInvalid, "65");
+  expect_refused(create("hall", &ticket, 512, with("root", 2, 17)), kInvalid, "settings.density.bias");
+  expect_refused(create("hall", &ticket, 512, with("root", 2, NAN)), kInvalid, "settings.density.bias");
+  v1::Density blind;
+  blind.set_foveation(9);
+  expect_refused(create("hall", &ticket, 512, blind), kInvalid, "foveation of 9");
+  v1::Density many;
+  for (int i = 0; i < 257; ++i) *many.add_priorities() = with("root", 2, 0).priorities(0);
+  expect_refused(create("hall", &ticket, 512, many), kInvalid, "257");
+
+  ASSERT_TRUE(create("hall", &ticket, 512, with("root", 2, 0)).ok());
+  v1::SessionSettings settings = get(ticket.session()).settings();
+  EXPECT_EQ(settings.density().priorities(0).node(), "root");
+  settings.set_bitrate_mbps(8);
+  EXPECT_TRUE(update(ticket.session(), settings).ok()) << "the same density";
+  EXPECT_EQ(get(ticket.session()).settings().density().priorities_size(), 1);
+  settings.mutable_density()->set_foveation(0);
+  expect_refused(update(ticket.session(), settings), grpc::StatusCode::FAILED_PRECONDITION, "density");
+  auto client = connect(ticket);
+  ASSERT_TRUE(client.ok()) << client.status();
+  EXPECT_NE(first_pair(**client), nullptr) << (*client)->status();
+}
+
 TEST_F(DaemonTest, FilesAreReadBelowTheSceneRootOnly) {
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "tessera_scene_root";
   std::filesystem::create_directories(folder / "inside");

@@ -24,6 +24,18 @@ TEST(FramePlan, EachFeatureBringsItsPass) {
   EXPECT_TRUE(make_frame_plan({.rigid_animation = true}).includes("object_transforms"));
 }
 
+TEST(FramePlan, DensityIsLeftOutUnlessTheSessionAsksForIt) {
+  EXPECT_FALSE(make_frame_plan({}).includes("density"));
+  for (const atlas::DensitySettings& density :
+       {atlas::DensitySettings{.foveation = 1}, atlas::DensitySettings{.barrel = true},
+        atlas::DensitySettings{.priorities = {{"table", 2}}}}) {
+    EXPECT_TRUE(density.any());
+    EXPECT_TRUE(make_frame_plan({}, density).includes("density"));
+  }
+  const std::string text = make_frame_plan({}, {.foveation = 1, .barrel = true}).to_string();
+  EXPECT_NE(text.find("foveation, barrel distortion"), std::string::npos) << text;
+}
+
 TEST(FramePlan, EveryPassHasAReason) {
   for (const PlannedPass& pass : make_frame_plan({}).passes) EXPECT_FALSE(pass.reason.empty()) << pass.name;
   const std::string text = make_frame_plan({.spot_lights = 3}).to_string();

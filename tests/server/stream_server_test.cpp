@@ -227,6 +227,42 @@ TEST_F(StreamServerTest, AHugeViewIsRefusedByItsPixels) {
   expect_pairs(**client, 1);
 }
 
+TEST_F(StreamServerTest, TheRendererLearnsTheClientsEyesAndItsNewestGaze) {
+  start();
+  std::vector<Recorded> log;  // the render thread's, until the server is gone
+  SessionSettings made;       // likewise
+  const auto a = server_->create_session(
+      [&made, make = recording(log)](const SessionSettings& s) {
+        made = s;
+        return make(s);
+      },
+      small());
+  ASSERT_TRUE(a.ok()) << a.status();
+  client::ConnectionSettings stereo = connection(*a);
+  stereo.client.eyes.push_back({.fov = Fov::symmetric(0.8f, 1.0f)});
+  stereo.client.eyes[0].in_head.position.x = -0.03125;
+  stereo.client.eyes[1].in_head = {{0.03125, 0, 0}, dquat(0.5, 0.5, 0.5, 0.5)};
+  auto client = client::Connection::connect(stereo, clock_);
+  ASSERT_TRUE(client.ok()) << client.status();
+  const vec3 gaze(0.6f, 0, -0.8f);
+  FrameNumber pairs = 0;
+  for (const TimeNs give_up = clock_.now() + kPatienceNs; pairs < 3 && clock_.now() < give_up;) {
+    (*client)->send_pose({clock_.now(), {}}, gaze);
+    if ((*client)->take_newest()) ++pairs;
+    std::this_thread::sleep_for(std::chrono::nanoseconds(kDisplayNs));
+  }
+  client->reset();
+  server_.reset();
+  ASSERT_FALSE(log.empty());
+  for (const Recorded& r : log) EXPECT_EQ(r.input.gaze, gaze);
+  ASSERT_EQ(made.eyes.size(), 2u);
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(made.eyes[i].in_head, stereo.client.eyes[i].in_head);
+    EXPECT_EQ(made.eyes[i].fov.up, stereo.client.eyes[i].fov.up);
+  }
+  EXPECT_EQ(made.client_view.width, 160u);
+}
+
 // The same inputs give the same pictures, whether real sockets and clocks lie between the two ends or
 // nothing.
 TEST_F(StreamServerTest, PicturesOverSocketsAreThoseOfVirtualTime) {

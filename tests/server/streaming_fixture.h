@@ -38,7 +38,7 @@ class StreamingTest : public testing::Test {
             .token = ticket.token,
             .client = {.width = 160,
                        .height = 90,
-                       .fov = Fov::symmetric(1.0f, 16.0f / 9.0f),
+                       .eyes = {{.fov = Fov::symmetric(1.0f, 16.0f / 9.0f)}},
                        .display_hz = 60,
                        .name = "test"}};
   }

@@ -24,7 +24,10 @@ constexpr const char* kHello = "04010000 000102030405060708090a0b0c0d0e0f 112233
 constexpr const char* kAnswer = "05010000 1122334455667788";
 constexpr const char* kPose =
     "06010000 01020304 0000000059682f00 0000000059682f01 3ff8000000000000 c000000000000000 3fd0000000000000"
-    "3f000000 bf000000 3f000000 3f000000";
+    "3f000000 bf000000 3f000000 3f000000 00";
+constexpr const char* kLookingPose =
+    "06010000 01020304 0000000059682f00 0000000059682f01 3ff8000000000000 c000000000000000 3fd0000000000000"
+    "3f000000 bf000000 3f000000 3f000000 01 3f800000 00000000 00000000";
 
 SessionToken counting_token() {
   SessionToken token;
@@ -46,6 +49,15 @@ TEST(Datagram, KnownBytesBothWays) {
   EXPECT_EQ(pose->timed.time_ns, some_pose().timed.time_ns);
   EXPECT_EQ(pose->sent_ns, some_pose().sent_ns);
   EXPECT_TRUE(pose->timed.pose == some_pose().timed.pose);
+  EXPECT_FALSE(pose->gaze.has_value());
+
+  SequencedPose looking = some_pose();
+  looking.gaze = vec3(1, 0, 0);
+  EXPECT_EQ(write_pose_datagram(looking), from_hex(kLookingPose));
+  const auto looks = parse_pose_datagram(from_hex(kLookingPose));
+  ASSERT_TRUE(looks.ok()) << looks.status();
+  EXPECT_TRUE(looks->timed.pose == some_pose().timed.pose);
+  EXPECT_EQ(looks->gaze, looking.gaze);
 }
 
 TEST(Datagram, AnAnswerIsSmallerThanItsHello) {
@@ -53,7 +65,7 @@ TEST(Datagram, AnAnswerIsSmallerThanItsHello) {
 }
 
 TEST(Datagram, EveryTruncationAndEveryExtraByteIsAnError) {
-  for (const char* hex : {kHello, kAnswer, kPose}) {
+  for (const char* hex : {kHello, kAnswer, kPose, kLookingPose}) {
     const Bytes whole = from_hex(hex);
     for (size_t n = 0; n < whole.size() + 4; ++n) {
       Bytes bytes = whole;
@@ -61,7 +73,7 @@ TEST(Datagram, EveryTruncationAndEveryExtraByteIsAnError) {
       const bool good = n == whole.size();
       EXPECT_EQ(parse_hello(bytes).ok(), good && hex == kHello) << n;
       EXPECT_EQ(parse_hello_answer(bytes).ok(), good && hex == kAnswer) << n;
-      EXPECT_EQ(parse_pose_datagram(bytes).ok(), good && hex == kPose) << n;
+      EXPECT_EQ(parse_pose_datagram(bytes).ok(), good && (hex == kPose || hex == kLookingPose)) << n;
     }
   }
 }
@@ -101,6 +113,25 @@ TEST(Datagram, PosesOutsideTheirRangeAreRefused) {
   scaled.timed.pose.orientation = dquat(0, 1.5, 0, 0);
   EXPECT_NEAR(glm::length(parse_pose_datagram(write_pose_datagram(scaled))->timed.pose.orientation), 1,
               1e-12);
+}
+
+TEST(Datagram, GazesOutsideTheirRangeAreRefused) {
+  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  for (const vec3& bad : {vec3(0), vec3(nan, 0, 0), vec3(0, nan, 1), vec3(0, 0, inf), vec3(-inf, 0, 0),
+                          vec3(0.4f, 0, 0), vec3(0, 2.1f, 0), vec3(1e30f, 1e30f, 0), vec3(1e-30f, 0, 0)}) {
+    SequencedPose pose = some_pose();
+    pose.gaze = bad;
+    EXPECT_FALSE(parse_pose_datagram(write_pose_datagram(pose)).ok())
+        << bad.x << " " << bad.y << " " << bad.z;
+  }
+  SequencedPose scaled = some_pose();
+  scaled.gaze = vec3(0.6f, 0, -1.6f);
+  EXPECT_NEAR(glm::length(*parse_pose_datagram(write_pose_datagram(scaled))->gaze), 1, 1e-6);
+  Bytes other_kind = from_hex(kLookingPose);
+  for (const uint8_t kind : {uint8_t{2}, uint8_t{255}}) {
+    other_kind[64] = kind;  // where the gaze's kind stands
+    EXPECT_FALSE(parse_pose_datagram(other_kind).ok());
+  }
 }
 
 TEST(NewestPose, TakesOnlyWhatIsNewerThroughTheWrap) {

@@ -16,7 +16,16 @@ using test::from_hex;
 Hello some_hello() {
   Hello m;
   m.token.fill(0xa5);
-  m.client = {1920, 1080, {-1.25f, 1.5f, -0.75f, 1}, 72, "viewer"};
+  m.client = {1920, 1080, {{.fov = {-1.25f, 1.5f, -0.75f, 1}}}, 72, "viewer"};
+  return m;
+}
+
+// The right eye a little higher than the left one, and turned; all values are exact in f32.
+Hello stereo_hello() {
+  Hello m = some_hello();
+  m.client.eyes.push_back({.fov = {-1.5f, 1.25f, -0.75f, 1}});
+  m.client.eyes[0].in_head.position = {-1.0 / 32, 0, 0};
+  m.client.eyes[1].in_head = {{1.0 / 32, 1.0 / 64, 0}, dquat(0.5, 0.5, 0.5, 0.5)};
   return m;
 }
 
@@ -33,13 +42,20 @@ Welcome some_welcome() {
 
 // The vectors of docs/protocol.md.
 constexpr const char* kHello =
-    "0001 a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5 0780 0438 bfa00000 3fc00000 bf400000 3f800000 42900000 0006 "
-    "766965776572";
+    "0001 a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5 0780 0438 01 00000000 00000000 00000000 00000000 00000000 "
+    "00000000 "
+    "3f800000 bfa00000 3fc00000 bf400000 3f800000 42900000 0006 766965776572";
+constexpr const char* kStereoHello =
+    "0001 a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5 0780 0438 02 bd000000 00000000 00000000 00000000 00000000 "
+    "00000000 "
+    "3f800000 bfa00000 3fc00000 bf400000 3f800000 3d000000 3c800000 00000000 3f000000 3f000000 3f000000 "
+    "3f000000 bfc00000 3fa00000 bf400000 3f800000 42900000 0006 766965776572";
 constexpr const char* kWelcome =
     "0001 0000000000000003 138c 11111111 22222222 60 61 3333 0800 0400 41f00000 00";
 
 TEST(Messages, KnownBytes) {
   EXPECT_EQ(encode(some_hello()), from_hex(kHello));
+  EXPECT_EQ(encode(stereo_hello()), from_hex(kStereoHello));
   EXPECT_EQ(encode(some_welcome()), from_hex(kWelcome));
   EXPECT_EQ(encode(ClockPing{1, 2}), from_hex("00000001 0000000000000002"));
   EXPECT_EQ(encode(ClockPong{1, 2, 3, 4}),
@@ -58,8 +74,16 @@ TEST(Messages, ComeBackAsTheyWere) {
   ASSERT_TRUE(hello.ok()) << hello.status();
   EXPECT_EQ(hello->token, some_hello().token);
   EXPECT_EQ(hello->client.name, "viewer");
-  EXPECT_EQ(hello->client.fov.right, 1.5f);
+  EXPECT_EQ(hello->client.eyes[0].fov.right, 1.5f);
   EXPECT_EQ(hello->client.display_hz, 72);
+
+  const auto stereo = decode_hello(encode(stereo_hello()));
+  ASSERT_TRUE(stereo.ok()) << stereo.status();
+  ASSERT_EQ(stereo->client.eyes.size(), 2u);
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(stereo->client.eyes[i].in_head, stereo_hello().client.eyes[i].in_head);
+    EXPECT_EQ(stereo->client.eyes[i].fov.left, stereo_hello().client.eyes[i].fov.left);
+  }
 
   Welcome with_keys = some_welcome();
   with_keys.srtp.emplace().server.fill(1);
@@ -84,12 +108,14 @@ TEST(Messages, EveryTruncationAndEveryExtraByteIsAnError) {
   Welcome with_keys = some_welcome();
   with_keys.srtp.emplace();
   const std::vector<ClientFrameTimes> timings(3);
-  const SequencedPose pose{1, {2, {}}};
+  const SequencedPose pose{1, {2, {}}}, looking{1, {2, {}}, 0, vec3(0, 0, -1)};
   const std::pair<Bytes, std::function<Status(const Bytes&)>> cases[] = {
       {encode(some_hello()), [](const Bytes& b) { return decode_hello(b).status(); }},
+      {encode(stereo_hello()), [](const Bytes& b) { return decode_hello(b).status(); }},
       {encode(some_welcome()), [](const Bytes& b) { return decode_welcome(b).status(); }},
       {encode(with_keys), [](const Bytes& b) { return decode_welcome(b).status(); }},
       {encode(pose), [](const Bytes& b) { return decode_pose(b).status(); }},
+      {encode(looking), [](const Bytes& b) { return decode_pose(b).status(); }},
       {encode(timings), [](const Bytes& b) { return decode_timings(b).status(); }},
       {encode(ClockPing{}), [](const Bytes& b) { return decode_ping(b).status(); }},
       {encode(ClockPong{}), [](const Bytes& b) { return decode_pong(b).status(); }},
@@ -109,15 +135,16 @@ TEST(Messages, ValuesOutsideTheirRangeAreRefused) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   using Change = void (*)(ClientSettings&);
   for (Change change : std::initializer_list<Change>{
-           [](auto& c) { c.width = 0; }, [](auto& c) { c.height = 16385; }, [](auto& c) { c.fov.left = 2; },
-           [](auto& c) { c.fov.up = -1; }, [](auto& c) { c.fov.right = 61; },
-           [](auto& c) { c.display_hz = 0; }, [](auto& c) { c.display_hz = 1001; }}) {
+           [](auto& c) { c.width = 0; }, [](auto& c) { c.height = 16385; },
+           [](auto& c) { c.eyes[0].fov.left = 2; }, [](auto& c) { c.eyes[0].fov.up = -1; },
+           [](auto& c) { c.eyes[0].fov.right = 61; }, [](auto& c) { c.display_hz = 0; },
+           [](auto& c) { c.display_hz = 1001; }}) {
     Hello hello = some_hello();
     change(hello.client);
     EXPECT_EQ(decode_hello(encode(hello)).status().code(), absl::StatusCode::kInvalidArgument);
   }
   Hello hello = some_hello();
-  hello.client.fov.left = nan;
+  hello.client.eyes[0].fov.left = nan;
   EXPECT_FALSE(decode_hello(encode(hello)).ok());
   hello = some_hello();
   hello.client.display_hz = nan;
@@ -137,6 +164,35 @@ TEST(Messages, ValuesOutsideTheirRangeAreRefused) {
   long_name.insert(long_name.end(), {0, 65});
   long_name.resize(long_name.size() + 65, 'x');
   EXPECT_FALSE(decode_hello(long_name).ok());
+}
+
+TEST(Messages, EyesOutsideTheirRangeAreRefused) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  using Change = void (*)(Eye&);
+  for (Change change : std::initializer_list<Change>{
+           [](Eye& e) { e.fov.right = e.fov.left; }, [](Eye& e) { e.fov.down = -61; },
+           [](Eye& e) { e.in_head.position.x = 1.01; }, [](Eye& e) { e.in_head.position.z = -1e30; },
+           [](Eye& e) { e.in_head.orientation = dquat(0, 0, 0, 0); },
+           [](Eye& e) { e.in_head.orientation = dquat(0, 0, 3, 0); }}) {
+    for (size_t i = 0; i < 2; ++i) {
+      Hello hello = stereo_hello();
+      change(hello.client.eyes[i]);
+      EXPECT_EQ(decode_hello(encode(hello)).status().code(), absl::StatusCode::kInvalidArgument);
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    Hello hello = stereo_hello();
+    hello.client.eyes[1].in_head.position[axis] = nan;
+    EXPECT_FALSE(decode_hello(encode(hello)).ok());
+    hello = stereo_hello();
+    hello.client.eyes[1].in_head.orientation[axis] = nan;
+    EXPECT_FALSE(decode_hello(encode(hello)).ok());
+  }
+  Hello hello = some_hello();
+  hello.client.eyes.clear();
+  EXPECT_FALSE(decode_hello(encode(hello)).ok()) << "nobody looks";
+  hello.client.eyes.resize(kMaxEyes + 1);
+  EXPECT_FALSE(decode_hello(encode(hello)).ok());
 }
 
 TEST(Messages, OtherVersionsAreNamed) {

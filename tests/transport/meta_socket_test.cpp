@@ -51,7 +51,7 @@ class MetaSockets : public test::AsioTest {
     MetaClientSettings s;
     s.server_port = listener->port();
     s.hello.token = token(token_byte);
-    s.hello.client = {640, 480, {}, 60, "test"};
+    s.hello.client = {640, 480, {{}}, 60, "test"};
     return s;
   }
   void connect(const MetaClientSettings& settings) {

@@ -11,6 +11,7 @@
 #include "offscreen.h"
 
 constexpr int kWidth = 160, kHeight = 120, kFrames = 30;  // of one eye; the eyes lie side by side
+constexpr double kEyeOffset = 0.032;                      // metres, from the middle of the head
 constexpr TesseraFov kFov = {-1, 1, -0.75f, 0.75f};
 
 // At an eye `right` of the head's middle (metres), turned to the left by `angle`.
@@ -28,8 +29,13 @@ int main(int argc, char** argv) try {
   info.ticket = ticket;
   info.viewWidth = kWidth;
   info.viewHeight = kHeight;
-  info.fov = kFov;
   info.displayRate = 60;
+  auto stereo = tessera::make<TesseraStereoInfo>();
+  for (int i = 0; i < 2; ++i) {
+    stereo.eyes[i] = {{i == 0 ? -kEyeOffset : kEyeOffset, 0, 0}, {0, 0, 0, 1}};
+    stereo.fovs[i] = kFov;
+  }
+  info.next = &stereo;
   tessera::Session session(info);
   tessera::Renderer renderer(session);
 
@@ -43,7 +49,7 @@ int main(int argc, char** argv) try {
     TesseraView eyes[2];
     for (int i = 0; i < 2; ++i) {
       eyes[i] = tessera::make<TesseraView>();
-      eyes[i].pose = pose(i == 0 ? -0.032 : 0.032, 0.01 * drawn);
+      eyes[i].pose = pose(i == 0 ? -kEyeOffset : kEyeOffset, 0.01 * drawn);
       eyes[i].fov = kFov;
       eyes[i].viewport = {i * kWidth, 0, kWidth, kHeight};
       eyes[i].framebuffer = TESSERA_BOUND_FRAMEBUFFER;

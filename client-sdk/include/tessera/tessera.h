@@ -77,6 +77,8 @@ typedef enum TesseraStructureType {
   TESSERA_TYPE_VIEW = 7,
   TESSERA_TYPE_LENS_DISTORTION = 8,
   TESSERA_TYPE_STATISTICS = 9,
+  TESSERA_TYPE_STEREO_INFO = 10,
+  TESSERA_TYPE_GAZE = 11,
   TESSERA_STRUCTURE_TYPE_MAX_ENUM = 0x7fffffff
 } TesseraStructureType;
 
@@ -93,7 +95,8 @@ typedef struct TesseraFov {
   float left, right, down, up;
 } TesseraFov;
 
-typedef struct TesseraSessionCreateInfo { /* TESSERA_TYPE_SESSION_CREATE_INFO */
+/* TESSERA_TYPE_SESSION_CREATE_INFO; may be extended by TesseraStereoInfo */
+typedef struct TesseraSessionCreateInfo {
   TesseraStructureType type;
   const void* next;
   uint32_t apiVersion;         /* TESSERA_API_VERSION */
@@ -101,17 +104,35 @@ typedef struct TesseraSessionCreateInfo { /* TESSERA_TYPE_SESSION_CREATE_INFO */
   const char* applicationName; /* for the server's logs; up to 64 bytes; may be NULL */
   uint32_t viewWidth;          /* pixels of one eye, 1..16384: the server shades for these */
   uint32_t viewHeight;
-  TesseraFov fov;         /* of the head: what either eye sees */
+  TesseraFov fov;         /* from where the head is; with TesseraStereoInfo it is not read */
   float displayRate;      /* Hz, 1..1000 */
   int64_t connectTimeout; /* ns, up to 60 s, for all addresses together, once the name is resolved; 0: 8 s */
 } TesseraSessionCreateInfo;
 
-typedef struct TesseraPoseInfo { /* TESSERA_TYPE_POSE_INFO */
+/* Two eyes: the server sends what either of them sees, shaded once for both. In OpenXR, xrLocateViews() gives
+ * these values in a reference space of the type VIEW. */
+typedef struct TesseraStereoInfo { /* TESSERA_TYPE_STEREO_INFO */
+  TesseraStructureType type;
+  const void* next;
+  TesseraPose eyes[TESSERA_MAX_VIEWS]; /* from the eye to the head; within ±1 m */
+  TesseraFov fovs[TESSERA_MAX_VIEWS];
+} TesseraStereoInfo;
+
+/* TESSERA_TYPE_POSE_INFO; may be extended by TesseraGaze */
+typedef struct TesseraPoseInfo {
   TesseraStructureType type;
   const void* next;
   TesseraPose pose;
   int64_t predictedDisplayTime; /* when the pose is expected to be true: later than in the call before */
 } TesseraPoseInfo;
+
+/* Where the eyes look, by an eye tracker: sessions with foveation shade less densely away from it. Poses
+ * without a gaze mean straight ahead. Without TLS it travels in clear text. */
+typedef struct TesseraGaze { /* TESSERA_TYPE_GAZE */
+  TesseraStructureType type;
+  const void* next;
+  float direction[3]; /* in the head's axes, ahead is (0, 0, -1); of length 1 (0.5 to 2 is brought there) */
+} TesseraGaze;
 
 typedef enum TesseraEventKind {
   TESSERA_EVENT_STATE_CHANGED = 1,

@@ -47,6 +47,8 @@ TESSERA_MAKE(TesseraDrawInfo, TESSERA_TYPE_DRAW_INFO)
 TESSERA_MAKE(TesseraView, TESSERA_TYPE_VIEW)
 TESSERA_MAKE(TesseraLensDistortion, TESSERA_TYPE_LENS_DISTORTION)
 TESSERA_MAKE(TesseraStatistics, TESSERA_TYPE_STATISTICS)
+TESSERA_MAKE(TesseraStereoInfo, TESSERA_TYPE_STEREO_INFO)
+TESSERA_MAKE(TesseraGaze, TESSERA_TYPE_GAZE)
 #undef TESSERA_MAKE
 
 // Owns a handle.
@@ -76,8 +78,10 @@ class Session : public Owner<TesseraSession, tesseraDestroySession> {
     if (check(tesseraPollEvent(handle_, &event)) == TESSERA_EVENT_UNAVAILABLE) return std::nullopt;
     return event;
   }
-  TesseraResult send_pose(const TesseraPose& pose, int64_t predicted_display_time) {
+  TesseraResult send_pose(const TesseraPose& pose, int64_t predicted_display_time,
+                          const TesseraGaze* gaze = nullptr) {
     auto info = make<TesseraPoseInfo>();
+    info.next = gaze;
     info.pose = pose;
     info.predictedDisplayTime = predicted_display_time;
     return check(tesseraSendPose(handle_, &info));
