@@ -251,8 +251,6 @@ int main(int argc, char** argv) {
   init_logging(log_level);
   if (loopback->parsed()) return run_loopback(settings);
   if (memory->parsed()) return run_memory(memory_settings);
-  return culling->parsed() ? run_culling(culling_settings) : run_report(folder);
-
   if (culling->parsed()) return run_culling(culling_settings);
   return spatial->parsed() ? run_spatial(spatial_settings) : run_report(folder);
 }
