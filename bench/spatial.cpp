@@ -271,8 +271,8 @@ SpatialSettings default_spatial_settings() {
 }
 
 std::vector<std::string> spatial_options() {
-  return {"scene",      "path",   "start", "seconds",     "size", "fov-y", "atlas",
-          "server-fps", "device", "truth", "truth-cache", "json", "report"};
+  return {"scene",  "path",       "start",  "seconds", "size",        "fov-y", "atlas",
+          "layout", "server-fps", "device", "truth",   "truth-cache", "json",  "report"};
 }
 
 nlohmann::json to_json(const SpatialResult& result) {

@@ -193,7 +193,7 @@ TEST_F(SpatialSessionTest, NothingScalesByDefault) {
 std::map<scene::PatchId, uint32_t> texels_of(const Session& session) {
   std::map<scene::PatchId, uint32_t> texels;
   for (const atlas::Placement& p : session.placements())
-    texels[p.patch] = p.kind == atlas::PlacementKind::color ? 1 : p.width() * p.height();
+    texels[p.patch] = p.kind == atlas::PlacementKind::color ? 1 : static_cast<uint32_t>(p.texels());
   return texels;
 }
 
