@@ -115,7 +115,7 @@ void add_options(CLI::App& app, MemorySettings& settings) {
 }
 
 std::vector<std::string> to_flags(const MemorySettings& settings) {
-  std::vector<std::string> flags = to_flags(settings.shared);
+  std::vector<std::string> flags = to_flags(settings.shared, MemorySettings{}.shared);
   flags.push_back("--patches=" + joined(settings.speed.patches));
   flags.push_back(absl::StrCat("--churn=", settings.speed.churn));
   flags.push_back(absl::StrCat("--speed-frames=", settings.speed.frames));

@@ -230,11 +230,11 @@ nlohmann::json to_json(const LoopbackSettings& settings) {
   return json;
 }
 
-std::vector<std::string> to_flags(const LoopbackSettings& settings) {
-  const nlohmann::json values = to_json(settings), defaults = to_json(LoopbackSettings{});
+std::vector<std::string> to_flags(const LoopbackSettings& settings, const LoopbackSettings& defaults) {
+  const nlohmann::json values = to_json(settings), others = to_json(defaults);
   std::vector<std::string> flags;
   for (const auto& [name, value] : values.items()) {
-    if (value != defaults[name]) flags.push_back("--" + name + "=" + flag_value(value));
+    if (value != others[name]) flags.push_back("--" + name + "=" + flag_value(value));
   }
   return flags;
 }

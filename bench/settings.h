@@ -82,6 +82,6 @@ void add_options(CLI::App& app, LoopbackSettings& settings, std::span<const std:
 nlohmann::json to_json(const LoopbackSettings& settings);
 
 // The flags that differ from the defaults, e.g. {"--fps=30"}.
-std::vector<std::string> to_flags(const LoopbackSettings& settings);
+std::vector<std::string> to_flags(const LoopbackSettings& settings, const LoopbackSettings& defaults = {});
 
 }  // namespace tessera::bench
