@@ -147,6 +147,8 @@ Status RealLoopback::start_viewer(uint32_t index) {
   request.set_scene("scene");
   request.mutable_settings()->set_atlas_width(s_.atlas.width);
   request.mutable_settings()->set_atlas_height(s_.atlas.height);
+  request.mutable_settings()->set_layout(
+      s_.layout == atlas::LayoutKind::coherent ? v1::LAYOUT_COHERENT : v1::LAYOUT_BLOCKS);
   request.mutable_settings()->set_bitrate_mbps(s_.bitrate_mbps);
   request.mutable_settings()->set_frames_per_second(s_.server_fps);
   TESSERA_RETURN_IF_ERROR(

@@ -64,6 +64,22 @@ Status read(const v1::Density& density, SessionSettings& settings) {
   return absl::OkStatus();
 }
 
+// Writes the default into `s`.
+StatusOr<atlas::LayoutKind> layout_kind(v1::SessionSettings& s) {
+  switch (s.layout()) {
+    case v1::LAYOUT_UNSPECIFIED:
+      s.set_layout(v1::LAYOUT_BLOCKS);
+      return atlas::LayoutKind::blocks;
+    case v1::LAYOUT_BLOCKS:
+      return atlas::LayoutKind::blocks;
+    case v1::LAYOUT_COHERENT:
+      return atlas::LayoutKind::coherent;
+    default:
+      return absl::InvalidArgumentError(
+          absl::StrCat("settings.layout: ", static_cast<int>(s.layout()), " is none that this server knows"));
+  }
+}
+
 }  // namespace
 
 StatusOr<SessionSettings> session_settings(v1::SessionSettings& s) {
@@ -74,8 +90,9 @@ StatusOr<SessionSettings> session_settings(v1::SessionSettings& s) {
   TESSERA_RETURN_IF_ERROR(set_checked(mbps, 20.0, 0.1, 1000.0, "settings.bitrate_mbps"));
   TESSERA_RETURN_IF_ERROR(set_checked(fps, 30.0, 1.0, 240.0, "settings.frames_per_second"));
   SessionSettings settings;
-  settings.layout = atlas::layout_settings(atlas::LayoutKind::blocks, width, height);
-  const uint32_t side = 1u << settings.layout.superblock_log;
+  TESSERA_ASSIGN_OR_RETURN(const atlas::LayoutKind kind, layout_kind(s));
+  settings.layout = atlas::layout_settings(kind, width, height);
+  const uint32_t side = kind == atlas::LayoutKind::blocks ? 1u << settings.layout.superblock_log : 2;
   if (width % 8 || height % 8 || width % side || height % side) {
     return absl::InvalidArgumentError(absl::StrCat("settings: an atlas of ", width, "x", height,
                                                    " texels; both sides must be multiples of ",
@@ -130,6 +147,9 @@ StatusOr<SessionSettings> updated_settings(v1::SessionSettings& current, const v
     return absl::FailedPreconditionError(absl::StrCat(
         "settings: a session's atlas keeps its ", current.atlas_width(), "x", current.atlas_height(),
         " texels; create a session with another one and move the client to it"));
+  if (merged.layout() != current.layout())
+    return absl::FailedPreconditionError(
+        "settings.layout: a session keeps its own; create a session with another one and move the client to it");
   current = std::move(merged);
   return settings;
 }
