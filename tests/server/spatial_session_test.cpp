@@ -205,7 +205,8 @@ uint64_t sum(const std::map<scene::PatchId, uint32_t>& texels) {
 
 SessionSettings without_bias() {
   SessionSettings settings = gallery_settings();
-  settings.layout = atlas::layout_settings(atlas::LayoutKind::blocks, 1024, 1024);
+  // So large that no block is cut to the side of a superblock.
+  settings.layout = atlas::layout_settings(atlas::LayoutKind::blocks, 4096, 2048);
   settings.layout.levels.min_bias = settings.layout.levels.max_bias = 0;
   return settings;
 }
@@ -214,8 +215,6 @@ TEST_F(SpatialSessionTest, FoveationSavesSamplesAndTheGazeSaysWhere) {
   const std::vector<TimedPose> poses = walk(from_ms(300));
   const auto samples = [&](bool foveated, const std::optional<vec3>& gaze) {
     SessionSettings settings = without_bias();
-    settings.layout = atlas::layout_settings(atlas::LayoutKind::blocks, 2048, 2048);
-    settings.layout.levels.min_bias = settings.layout.levels.max_bias = 0;
     // A display that shows more than the eye sees but for the middle 12 degrees.
     settings.client_view.width = 960;
     settings.client_view.height = 720;
