@@ -74,7 +74,7 @@ Status Session::Impl::set_up() {
       gather, shading::Gather::create(device, scene->gpu_scene(), scene->lighting(), gather_settings));
   TESSERA_ASSIGN_OR_RETURN(
       converter, codec::YuvConverter::create(device, settings.layout.width, settings.layout.height));
-  const codec::VideoSettings video{.width = settings.layout.width,
+  const codec::EncoderSettings video{.width = settings.layout.width,
                                    .height = settings.layout.height,
                                    .frames_per_second = settings.rate.frames_per_second,
                                    .bitrate_bps = settings.rate.bitrate_bps,
