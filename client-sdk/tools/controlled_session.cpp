@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "client-sdk/tools/made_ticket.h"
+#include "proto/atlas_codec.h"
 #include "proto/control_access.h"
 #include "transport/asio/endpoint.h"
 
@@ -30,12 +31,11 @@ bool is_starting(const Status& status) {
                                          absl::StrContains(status.message(), "still loading"));
 }
 
-Status create_session(v1::Control::Stub& control, const std::string& scene, v1::Ticket& ticket) {
+Status create_session(v1::Control::Stub& control, const v1::CreateSessionRequest& request,
+                      v1::Ticket& ticket) {
   constexpr std::chrono::milliseconds kRetryInterval{250};
   constexpr std::chrono::seconds kLoadTime{120};
   const auto start = std::chrono::steady_clock::now();
-  v1::CreateSessionRequest request;
-  request.set_scene(scene);
   while (true) {
     grpc::ClientContext context;
     limit(context);
@@ -88,14 +88,18 @@ StatusOr<std::string> token(const ControlSettings& settings) {
 }  // namespace
 
 StatusOr<std::unique_ptr<ControlledSession>> ControlledSession::create(const ControlSettings& settings,
-                                                                       const std::string& scene) {
+                                                                       const std::string& scene,
+                                                                       AtlasCodec codec) {
   TESSERA_ASSIGN_OR_RETURN(const auto channel_credentials, credentials(settings));
   std::unique_ptr<ControlledSession> session(new ControlledSession);
   TESSERA_ASSIGN_OR_RETURN(const std::string control_token, token(settings));
   session->stub_ =
       v1::Control::NewStub(control_channel(settings.endpoint, channel_credentials, control_token));
+  v1::CreateSessionRequest request;
+  request.set_scene(scene);
+  request.mutable_settings()->set_codec(to_proto(codec));
   v1::Ticket made;
-  if (const Status status = create_session(*session->stub_, scene, made); !status.ok())
+  if (const Status status = create_session(*session->stub_, request, made); !status.ok())
     return absl::Status(status.code(),
                         absl::StrCat("control at ", settings.endpoint, ": ", status.message()));
   session->id_ = made.session();

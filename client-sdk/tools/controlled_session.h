@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/atlas_codec.h"
 #include "base/status.h"
 #include "client-sdk/ticket.h"
 #include "proto/frame_reader.h"
@@ -22,7 +23,7 @@ struct ControlSettings {
 class ControlledSession {
  public:
   static StatusOr<std::unique_ptr<ControlledSession>> create(const ControlSettings& settings,
-                                                             const std::string& scene);
+                                                             const std::string& scene, AtlasCodec codec);
   // Deletes it, unless it was kept.
   ~ControlledSession();
 

@@ -38,6 +38,7 @@ Exit codes: 0 done, 1 the stream failed, 2 wrong usage.)";
 
 struct Settings {
   client::ControlSettings control;
+  AtlasCodec codec = AtlasCodec::h264;
   std::string scene, ticket, path, out, json, frames_csv, trace;
   bool print_ticket = false;
   std::vector<double> position;
@@ -180,7 +181,8 @@ class Viewer {
 };
 
 Status print_ticket(const Settings& s) {
-  TESSERA_ASSIGN_OR_RETURN(const auto session, client::ControlledSession::create(s.control, s.scene));
+  TESSERA_ASSIGN_OR_RETURN(const auto session,
+                           client::ControlledSession::create(s.control, s.scene, s.codec));
   session->keep();
   std::cout << client::to_string(session->ticket()) << std::endl;
   std::string tls = " -plaintext";
@@ -218,7 +220,7 @@ StatusOr<nlohmann::json> view(const Settings& s) {
   if (!s.ticket.empty()) {
     TESSERA_ASSIGN_OR_RETURN(ticket, client::parse_ticket(s.ticket));
   } else {
-    TESSERA_ASSIGN_OR_RETURN(session, client::ControlledSession::create(s.control, s.scene));
+    TESSERA_ASSIGN_OR_RETURN(session, client::ControlledSession::create(s.control, s.scene, s.codec));
     ticket = session->ticket();
     if (!s.frames_csv.empty() || !s.trace.empty()) session->record_frames();
   }
@@ -275,6 +277,14 @@ int main(int argc, char** argv) {
   app.add_flag("--insecure", s.control.insecure, "send the control token in clear text beyond loopback");
   CLI::Option* scene =
       app.add_option("--scene", s.scene, "view a scene that the daemon holds, in a new session");
+  std::vector<std::string> codecs;
+  for (const auto& [codec, name] : kAtlasCodecs) codecs.emplace_back(name);
+  app.add_option_function<std::string>(
+         "--codec", [&s](const std::string& name) { s.codec = *atlas_codec_from(name); },
+         "with --scene: how the new session codes its atlas")
+      ->check(CLI::IsMember(codecs))
+      ->default_str(std::string(name_of(s.codec)))
+      ->needs(scene);
   app.add_option("--ticket", s.ticket, "view the session of this ticket: tessera://HOST:PORT/TOKEN[?ca=FILE]")
       ->envname("TESSERA_TICKET")
       ->excludes(scene)
