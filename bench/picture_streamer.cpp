@@ -55,7 +55,7 @@ StatusOr<std::unique_ptr<PictureStreamer>> PictureStreamer::create(PictureMethod
   impl->client = client_view(settings);
   impl->rate = {.bitrate_bps = settings.bitrate_mbps * 1e6, .frames_per_second = settings.server_fps};
   const View view = impl->source_view({});
-  const codec::VideoSettings video{.width = view.width,
+  const codec::EncoderSettings video{.width = view.width,
                                    .height = view.height,
                                    .frames_per_second = settings.server_fps,
                                    .bitrate_bps = settings.bitrate_mbps * 1e6};

@@ -18,6 +18,7 @@
 #include "bench/temporary_folder.h"
 #include "bench/truth_source.h"
 #include "client-sdk/tools/made_ticket.h"
+#include "proto/atlas_codec.h"
 #include "proto/control_access.h"
 #include "proto/frame_reader.h"
 #include "scene/procedural.h"
@@ -129,7 +130,8 @@ Status RealLoopback::describe_daemon() {
   v1::ServerInfo info;
   TESSERA_RETURN_IF_ERROR(to_status(control_->GetServerInfo(&info_context, {}, &info), "GetServerInfo"));
   result_.device = {info.device(), info.driver(), info.software_rendering()};
-  result_.notes.push_back("encoder: " + info.encoder());
+  result_.notes.push_back("encoder: " +
+                          (s_.codec == AtlasCodec::h264 ? info.encoder() : std::string(name_of(s_.codec))));
   v1::ListScenesResponse scenes;
   TESSERA_RETURN_IF_ERROR(to_status(control_->ListScenes(&scenes_context, {}, &scenes), "ListScenes"));
   server::FramePlan plan;
@@ -149,6 +151,7 @@ Status RealLoopback::start_viewer(uint32_t index) {
   request.mutable_settings()->set_atlas_height(s_.atlas.height);
   request.mutable_settings()->set_layout(
       s_.layout == atlas::LayoutKind::coherent ? v1::LAYOUT_COHERENT : v1::LAYOUT_BLOCKS);
+  request.mutable_settings()->set_codec(to_proto(s_.codec));
   request.mutable_settings()->set_bitrate_mbps(s_.bitrate_mbps);
   request.mutable_settings()->set_frames_per_second(s_.server_fps);
   TESSERA_RETURN_IF_ERROR(

@@ -25,7 +25,7 @@ void for_each_option(Settings& s, Visitor&& visit) {
   visit("Server", "server-ms", s.server_ms, "time charged to a server frame in virtual time");
   visit("Server", "atlas", s.atlas, "atlas size in texels (even; width a multiple of 8)");
   visit("Server", "layout", s.layout, "atlas layout");
-  visit("Server", "codec", s.codec, "atlas coding");
+  visit("Server", "codec", s.codec, "atlas coding; raw does without, whatever the bit rate");
   visit("Server", "bitrate-mbps", s.bitrate_mbps, "atlas and meta together");
   visit("Server", "pvs", s.pvs, "prediction of the potentially visible set");
   visit("Server", "device", s.device, "Vulkan device: cpu, an index, or part of its name");
@@ -53,9 +53,13 @@ void for_each_option(Settings& s, Visitor&& visit) {
   visit("Output", "estimate-only", s.estimate_only, "print how long the run would take, and stop");
 }
 
-const std::map<std::string, Codec> kCodecs{{"h264", Codec::h264}};
 const std::map<std::string, atlas::LayoutKind> kLayouts{{"blocks", atlas::LayoutKind::blocks},
                                                         {"coherent", atlas::LayoutKind::coherent}};
+const std::map<std::string, AtlasCodec> kCodecs = [] {
+  std::map<std::string, AtlasCodec> codecs;
+  for (const auto& [codec, name] : kAtlasCodecs) codecs.emplace(name, codec);
+  return codecs;
+}();
 const std::map<std::string, Truth> kTruths{{"4x", Truth::supersampled}, {"1x", Truth::one}};
 const std::map<std::string, Prediction> kPredictions{{"linear", Prediction::linear},
                                                      {"none", Prediction::none}};
@@ -92,7 +96,7 @@ struct AddOption {
                   const char* meaning) const {
     add_choice(group, name, field, meaning, kLayouts);
   }
-  void operator()(const char* group, const std::string& name, Codec& field, const char* meaning) const {
+  void operator()(const char* group, const std::string& name, AtlasCodec& field, const char* meaning) const {
     add_choice(group, name, field, meaning, kCodecs);
   }
   void operator()(const char* group, const std::string& name, Truth& field, const char* meaning) const {
@@ -130,7 +134,7 @@ struct WriteJson {
   void operator()(const char*, const char* name, atlas::LayoutKind field, const char*) const {
     out[name] = name_of(kLayouts, field);
   }
-  void operator()(const char*, const char* name, Codec field, const char*) const {
+  void operator()(const char*, const char* name, AtlasCodec field, const char*) const {
     out[name] = name_of(kCodecs, field);
   }
   void operator()(const char*, const char* name, Truth field, const char*) const {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "atlas/layout.h"
+#include "base/atlas_codec.h"
 #include "base/status.h"
 #include "gpu/device.h"
 
@@ -27,7 +28,6 @@ struct Size {
 std::istream& operator>>(std::istream& in, Size& size);
 std::ostream& operator<<(std::ostream& out, const Size& size);
 
-enum class Codec { h264 };
 enum class Truth { supersampled, one };  // 4x or 1x
 enum class Prediction { linear, none };
 
@@ -46,7 +46,7 @@ struct LoopbackSettings {
   double server_ms = 33.3;  // charged to a server frame in virtual time
   Size atlas{2048, 1024};
   atlas::LayoutKind layout = atlas::LayoutKind::blocks;
-  Codec codec = Codec::h264;
+  AtlasCodec codec = AtlasCodec::h264;
   double bitrate_mbps = 20;  // atlas and meta together
   Prediction pvs = Prediction::linear;
   std::string device = "cpu";

@@ -51,6 +51,7 @@ server::SessionSettings session_settings(const LoopbackSettings& s) {
   out.client_view = client_view(s);
   out.layout = atlas::layout_settings(s.layout, s.atlas.width, s.atlas.height);
   out.prediction.mode = s.pvs == Prediction::none ? pvs::PredictionMode::none : pvs::PredictionMode::linear;
+  out.codec = s.codec;
   out.rate.bitrate_bps = s.bitrate_mbps * 1e6;
   out.rate.frames_per_second = s.server_fps;
   return out;
@@ -148,7 +149,7 @@ StatusOr<std::unique_ptr<ShadingStreamer>> ShadingStreamer::create(std::shared_p
   impl->split = settings.split;
   impl->client = client_view(settings);
   TESSERA_ASSIGN_OR_RETURN(impl->session, server::Session::create(scene, session));
-  TESSERA_ASSIGN_OR_RETURN(impl->core, client::ClientCore::create());
+  TESSERA_ASSIGN_OR_RETURN(impl->core, client::ClientCore::create(settings.codec));
   const client::DisplaySettings display{.width = settings.size.width, .height = settings.size.height};
   TESSERA_ASSIGN_OR_RETURN(impl->display, client::Display::create(display));
   if (impl->split) {

@@ -40,7 +40,7 @@ class ShadingStreamer final : public Streamer {
   Status meter_coverage(CoverageMeter& meter, std::function<Pose(TimeNs)> true_pose);
 
   // The picture of the current frame with causes of error turned off, one more with each:
-  StatusOr<Image8> draw_uncoded_420(const View& view);  // no H.264
+  StatusOr<Image8> draw_uncoded_420(const View& view);  // no lossy codec
   StatusOr<Image8> draw_uncoded(const View& view);      // nor chroma subsampling
   // nor staleness: the placed samples are shaded again as seen from this view. `instant` is the scene at the
   // view's time.

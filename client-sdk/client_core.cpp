@@ -5,12 +5,12 @@
 
 #include "client-sdk/pairing.h"
 #include "client-sdk/triple_buffer.h"
-#include "codec/video_decoder.h"
+#include "codec/atlas_decoder.h"
 #include "geometry-compression/meta_codec.h"
 
 namespace tessera::client {
 struct ClientCore::Impl {
-  explicit Impl(std::unique_ptr<codec::VideoDecoder> video_decoder) : decoder(std::move(video_decoder)) {}
+  explicit Impl(std::unique_ptr<codec::AtlasDecoder> atlas_decoder) : decoder(std::move(atlas_decoder)) {}
 
   // Makes what the receiving thread knows visible to the others.
   void publish_stats() {
@@ -19,7 +19,7 @@ struct ClientCore::Impl {
     newest_pair.store(pairing.newest(), std::memory_order_relaxed);
   }
 
-  std::unique_ptr<codec::VideoDecoder> decoder;
+  std::unique_ptr<codec::AtlasDecoder> decoder;
   TripleBuffer<Pair> pairs;
   Pairing pairing{pairs};
   geometry_compression::MetaFrame meta;  // kept for its memory
@@ -33,14 +33,14 @@ struct ClientCore::Impl {
 ClientCore::ClientCore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 ClientCore::~ClientCore() = default;
 
-StatusOr<std::unique_ptr<ClientCore>> ClientCore::create() {
-  TESSERA_ASSIGN_OR_RETURN(auto decoder, codec::VideoDecoder::create());
+StatusOr<std::unique_ptr<ClientCore>> ClientCore::create(AtlasCodec codec) {
+  TESSERA_ASSIGN_OR_RETURN(auto decoder, codec::AtlasDecoder::create(codec));
   return std::unique_ptr<ClientCore>(new ClientCore(std::make_unique<Impl>(std::move(decoder))));
 }
 
 StatusOr<FrameNumber> ClientCore::on_atlas(std::span<const uint8_t> access_unit) {
   auto decoded = impl_->decoder->decode(access_unit);
-  // After a failure the decoder refuses everything up to the next key frame.
+  // After a failure a video decoder refuses everything up to the next key frame.
   impl_->wants_key_frame.store(!decoded.ok(), std::memory_order_relaxed);
   Status status = decoded.status();
   if (decoded.ok()) {

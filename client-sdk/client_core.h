@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 
+#include "base/atlas_codec.h"
 #include "base/frame_number.h"
 #include "base/status.h"
 #include "base/time.h"
@@ -39,16 +40,16 @@ struct Pair {
 // key frame.
 class ClientCore {
  public:
-  static StatusOr<std::unique_ptr<ClientCore>> create();
+  static StatusOr<std::unique_ptr<ClientCore>> create(AtlasCodec codec = AtlasCodec::h264);
   ~ClientCore();
 
-  // One whole H.264 access unit; the frame that it belongs to. An error is counted and returned, and leaves
-  // the core usable.
+  // One whole access unit, or picture packet; the frame that it belongs to. An error is counted and returned,
+  // and leaves the core usable.
   StatusOr<FrameNumber> on_atlas(std::span<const uint8_t> access_unit);
   // One whole meta packet. Packets must come in frame order (the channel is reliable); a damaged one is an
   // error that ends the session's state until a packet with full_state.
   StatusOr<FrameNumber> on_meta(std::span<const uint8_t> packet);
-  // True from a broken video chain until the next key frame has been decoded.
+  // True from a picture that could not be decoded until one that could.
   bool wants_key_frame() const;
 
   // The newest complete pair if there is one that was not taken yet, else nullptr. Valid until the next call.

@@ -57,8 +57,8 @@ struct Connection::Impl {
   const ConnectionSettings settings;
   const Clock& clock;
   const TimeNs give_up = clock.now() + settings.connect_timeout_ns;  // on connecting
-  std::unique_ptr<ClientCore> core;
-  asio::io_context io{1};  // run by one thread, which never waits for a decoder
+  std::unique_ptr<ClientCore> core;  // once the codec is known, before the first frame
+  asio::io_context io{1};            // run by one thread, which never waits for a decoder
   asio::executor_work_guard<asio::io_context::executor_type> work;
   asio::steady_timer ping_timer;
   std::shared_ptr<transport::MetaConnection> meta;  // set once, before the media client opens
@@ -93,7 +93,6 @@ void Connection::Impl::opened(const Status& status) {
 }
 
 Status Connection::Impl::open() {
-  TESSERA_ASSIGN_OR_RETURN(core, ClientCore::create());
   thread = std::thread([this] { io.run(); });
   TESSERA_RETURN_IF_ERROR(open_meta());
   TESSERA_RETURN_IF_ERROR(open_media());
@@ -117,8 +116,11 @@ Status Connection::Impl::open_meta() {
       [this, done](StatusOr<std::shared_ptr<transport::MetaConnection>> connection,
                    const transport::Welcome& answer) {
         welcome = answer;
-        if (connection.ok()) meta = *connection;  // before its first frame
-        done->set_value(connection.status());
+        if (!connection.ok()) return done->set_value(connection.status());
+        meta = *connection;  // before its first frame
+        auto made = ClientCore::create(answer.codec);
+        if (made.ok()) core = *std::move(made);
+        done->set_value(made.status());
       });
   return done->get_future().get();
 }
@@ -130,6 +132,7 @@ Status Connection::Impl::open_media() {
       .token = settings.token,
       .srtp = welcome.srtp,
       .bind_timeout_ns = std::max(give_up - clock.now(), kMinMediaTimeoutNs)};
+  media_settings.receiver.codec = welcome.codec;
   media_settings.receiver.payload_type = welcome.stream.payload_type;
   media_settings.receiver.rtx_payload_type = welcome.stream.rtx_payload_type;
   media_settings.receiver.ssrc = welcome.stream.ssrc;
@@ -150,6 +153,7 @@ Status Connection::Impl::open_media() {
 
 Status Connection::Impl::on_frame(FrameType type, std::span<const uint8_t> payload) {
   const TimeNs now = clock.now();
+  if (!core) return absl::CancelledError("this client has no decoder");
   if (type == FrameType::meta) return on_meta(payload);
   if (type == FrameType::pong) {
     TESSERA_ASSIGN_OR_RETURN(const transport::ClockPong pong, transport::decode_pong(payload));

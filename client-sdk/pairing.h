@@ -29,7 +29,7 @@ class Pairing {
 
   explicit Pairing(TripleBuffer<Pair>& pairs) : pairs_(pairs) {}
 
-  // A decoded picture whose reference chain is intact (VideoDecoder sees to that). Errors: its size is not
+  // A decoded picture whose reference chain is intact (the decoder sees to that). Errors: its size is not
   // what its meta frame says.
   Status on_atlas(FrameNumber frame, const YuvView& picture);
   // A decoded meta frame, in order. Errors: see MetaChecker, and as above.

@@ -22,7 +22,7 @@ void set_option(AVCodecContext& context, const char* name, const std::string& va
   av_opt_set(context.priv_data, name, value.c_str(), 0);
 }
 
-void configure_x264(AVCodecContext& context, const VideoSettings& settings) {
+void configure_x264(AVCodecContext& context, const EncoderSettings& settings) {
   set_option(context, "preset", settings.preset);
   set_option(context, "tune", "zerolatency");
   set_option(context, "forced-idr", "1");
@@ -36,7 +36,7 @@ void configure_x264(AVCodecContext& context, const VideoSettings& settings) {
       "cabac=0:ref=1:scenecut=0:mbtree=0:weightp=0:qcomp=1:sliced-threads=0:8x8dct=1:psy=0:deblock=-2,-2");
 }
 
-void configure_nvenc(AVCodecContext& context, const VideoSettings&) {
+void configure_nvenc(AVCodecContext& context, const EncoderSettings&) {
   set_option(context, "preset", "p4");
   set_option(context, "tune", "ull");
   set_option(context, "rc", "cbr");
@@ -53,7 +53,7 @@ const Flavour kX264 = {"libx264", configure_x264, false, true};
 const Flavour kNvenc = {"h264_nvenc", configure_nvenc, true, false};
 
 StatusOr<std::unique_ptr<LibavEncoder>> LibavEncoder::open(const Flavour& flavour,
-                                                           const VideoSettings& settings) {
+                                                           const EncoderSettings& settings) {
   std::unique_ptr<LibavEncoder> encoder(new LibavEncoder(flavour, settings));
   encoder->frame_.reset(av_frame_alloc());
   encoder->packet_.reset(av_packet_alloc());
@@ -103,7 +103,7 @@ void LibavEncoder::set_budget(double budget_bits) {
   if (flavour_.constant_bit_rate) context_->bit_rate = context_->rc_max_rate;
 }
 
-StatusOr<AccessUnit> LibavEncoder::encode(FrameNumber frame, const YuvView& picture, double budget_bits,
+StatusOr<AccessUnit> LibavEncoder::encode(FrameNumber frame, const AtlasPicture& picture, double budget_bits,
                                           bool key_frame) {
   if (!(budget_bits > 0))
     return absl::InvalidArgumentError(absl::StrFormat("encode: a budget of %g bits", budget_bits));
@@ -111,7 +111,7 @@ StatusOr<AccessUnit> LibavEncoder::encode(FrameNumber frame, const YuvView& pict
   if (key_frame && !last_was_key_frame_ && flavour_.reopen_for_key_frames)
     TESSERA_RETURN_IF_ERROR(reopen(budget_bits));
   set_budget(budget_bits);
-  TESSERA_RETURN_IF_ERROR(fill(picture, key_frame));
+  TESSERA_RETURN_IF_ERROR(fill(picture.yuv, key_frame));
   TESSERA_ASSIGN_OR_RETURN(const std::vector<uint8_t> bytes, send_and_receive());
 
   AccessUnit unit;

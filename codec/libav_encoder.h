@@ -11,7 +11,7 @@ namespace tessera::codec {
 struct Flavour {
   const char* codec;  // libavcodec's name
   // Sets private options on a context that has everything common.
-  void (*configure)(AVCodecContext& context, const VideoSettings& settings);
+  void (*configure)(AVCodecContext& context, const EncoderSettings& settings);
   // Also give each frame's budget as bit rate (constant bit rate), not only as buffer.
   bool constant_bit_rate;
   // A budget that grows takes effect one frame late (set_budget), too late for a key frame: it starts with a
@@ -24,15 +24,16 @@ extern const Flavour kNvenc;  // written from FFmpeg's documentation; never run 
 class LibavEncoder final : public VideoEncoder {
  public:
   // Unavailable, with FFmpeg's reason, if this encoder cannot be opened here.
-  static StatusOr<std::unique_ptr<LibavEncoder>> open(const Flavour& flavour, const VideoSettings& settings);
+  static StatusOr<std::unique_ptr<LibavEncoder>> open(const Flavour& flavour,
+                                                      const EncoderSettings& settings);
 
-  StatusOr<AccessUnit> encode(FrameNumber frame, const YuvView& picture, double budget_bits,
+  StatusOr<AccessUnit> encode(FrameNumber frame, const AtlasPicture& picture, double budget_bits,
                               bool key_frame) override;
   const std::string& choice() const override { return choice_; }
   void set_choice(std::string choice) { choice_ = std::move(choice); }
 
  private:
-  LibavEncoder(const Flavour& flavour, const VideoSettings& settings)
+  LibavEncoder(const Flavour& flavour, const EncoderSettings& settings)
       : flavour_(flavour), settings_(settings) {}
 
   Status reopen(double budget_bits);
@@ -41,7 +42,7 @@ class LibavEncoder final : public VideoEncoder {
   StatusOr<std::vector<uint8_t>> send_and_receive();
 
   const Flavour& flavour_;
-  VideoSettings settings_;
+  EncoderSettings settings_;
   std::string choice_;
   AvCodecContext context_;
   AvFrame frame_;

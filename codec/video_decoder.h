@@ -2,31 +2,22 @@
 #pragma once
 
 #include <memory>
-#include <optional>
-#include <span>
 
-#include "base/frame_number.h"
-#include "base/status.h"
-#include "base/yuv.h"
+#include "codec/atlas_decoder.h"
 
 namespace tessera::codec {
 
-struct DecodedFrame {
-  FrameNumber frame = 0;
-  YuvView picture;  // valid until the next decode() or destruction
-};
-
 // Not thread-safe.
-class VideoDecoder {
+class VideoDecoder final : public AtlasDecoder {
  public:
   // Pictures larger than this are refused (ResourceExhausted).
   static StatusOr<std::unique_ptr<VideoDecoder>> create(uint32_t max_width = 8192,
                                                         uint32_t max_height = 8192);
-  ~VideoDecoder();
+  ~VideoDecoder() override;
 
   // One whole access unit in, its picture out (no reordering, no delay). InvalidArgument for damaged data, a
   // missing frame number, or a format other than 8-bit 4:2:0; the decoder then waits for the next key frame.
-  StatusOr<DecodedFrame> decode(std::span<const uint8_t> access_unit);
+  StatusOr<DecodedFrame> decode(std::span<const uint8_t> access_unit) override;
 
  private:
   struct Impl;

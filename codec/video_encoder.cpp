@@ -13,7 +13,7 @@ namespace {
 // frame.
 constexpr const char* kNoVaapi = "FFmpeg's h264_vaapi cannot follow a budget per frame";
 
-Status check(const VideoSettings& s) {
+Status check(const EncoderSettings& s) {
   if (s.width == 0 || s.height == 0 || s.width % 2 != 0 || s.height % 2 != 0 || s.width > 16384 ||
       s.height > 16384)
     return absl::InvalidArgumentError(
@@ -30,7 +30,7 @@ Status check(const VideoSettings& s) {
   return absl::OkStatus();
 }
 
-StatusOr<std::unique_ptr<VideoEncoder>> open(const Flavour& flavour, const VideoSettings& settings,
+StatusOr<std::unique_ptr<VideoEncoder>> open(const Flavour& flavour, const EncoderSettings& settings,
                                              std::string choice) {
   TESSERA_ASSIGN_OR_RETURN(auto encoder, LibavEncoder::open(flavour, settings));
   spdlog::debug("video encoder: {}", choice);
@@ -40,7 +40,7 @@ StatusOr<std::unique_ptr<VideoEncoder>> open(const Flavour& flavour, const Video
 
 }  // namespace
 
-StatusOr<std::unique_ptr<VideoEncoder>> VideoEncoder::create(const VideoSettings& settings) {
+StatusOr<std::unique_ptr<VideoEncoder>> VideoEncoder::create(const EncoderSettings& settings) {
   TESSERA_RETURN_IF_ERROR(check(settings));
   route_ffmpeg_log();
   if (settings.encoder == "x264") return open(kX264, settings, "libx264 (asked for)");

@@ -74,4 +74,12 @@ YuvView view_of(const YuvImage& image) {
           image.v.data(), image.width,  image.width / 2};
 }
 
+void resize(uint32_t width, uint32_t height, YuvImage& image) {
+  image.width = width;
+  image.height = height;
+  image.y.resize(size_t{width} * height);
+  image.u.resize(image.y.size() / 4);
+  image.v.resize(image.y.size() / 4);
+}
+
 }  // namespace tessera::codec

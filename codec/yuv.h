@@ -12,5 +12,7 @@ namespace tessera::codec {
 YuvImage rgb_to_yuv(const Image8& image);  // even sides
 Image8 yuv_to_rgb(const YuvView& yuv);     // alpha 255
 YuvView view_of(const YuvImage& image);
+// Even sides; new values are unspecified.
+void resize(uint32_t width, uint32_t height, YuvImage& image);
 
 }  // namespace tessera::codec

@@ -9,6 +9,7 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_replace.h"
 #include "base/log.h"
+#include "proto/atlas_codec.h"
 #include "proto/frame_record.h"
 #include "server/session.h"
 #include "transport/asio/endpoint.h"
@@ -30,6 +31,19 @@ Status set_checked(T& value, T otherwise, T low, T high, const char* field) {
   if (value == T{}) value = otherwise;
   if (value >= low && value <= high) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(field, ": is ", value, ", must be ", low, " to ", high));
+}
+
+StatusOr<AtlasCodec> checked_codec(v1::SessionSettings& s, uint32_t width, uint32_t height) {
+  constexpr uint64_t kMaxRawTexels = 2u << 20;  // a frame must fit into the network's queues
+  if (s.codec() == v1::ATLAS_CODEC_UNSPECIFIED) s.set_codec(to_proto(AtlasCodec::h264));
+  const std::optional<AtlasCodec> codec = from_proto(s.codec());
+  if (!codec)
+    return absl::InvalidArgumentError(
+        absl::StrCat("settings.codec: is ", static_cast<int>(s.codec()), ", must be H264, JPEG or RAW"));
+  if (codec == AtlasCodec::raw && uint64_t{width} * height > kMaxRawTexels)
+    return absl::InvalidArgumentError(absl::StrCat("settings.codec: RAW takes an atlas of up to ",
+                                                   kMaxRawTexels, " texels, not ", width, "x", height));
+  return *codec;
 }
 
 // gRPC writes "ipv4:127.0.0.1:40000" or "ipv6:%5B::1%5D:40000".
@@ -99,6 +113,7 @@ StatusOr<SessionSettings> session_settings(v1::SessionSettings& s) {
                                                    std::max(side, 8u)));
   }
   TESSERA_RETURN_IF_ERROR(read(s.density(), settings));
+  TESSERA_ASSIGN_OR_RETURN(settings.codec, checked_codec(s, width, height));
   settings.rate.bitrate_bps = mbps * 1e6;
   settings.rate.frames_per_second = fps;
   s.set_atlas_width(width);
@@ -150,6 +165,10 @@ StatusOr<SessionSettings> updated_settings(v1::SessionSettings& current, const v
   if (merged.layout() != current.layout())
     return absl::FailedPreconditionError(
         "settings.layout: a session keeps its own; create a session with another one and move the client to it");
+  if (merged.codec() != current.codec())
+    return absl::FailedPreconditionError(
+        absl::StrCat("settings.codec: a session keeps its ", v1::AtlasCodec_Name(current.codec()),
+                     "; create a session with another one and move the client to it"));
   current = std::move(merged);
   return settings;
 }

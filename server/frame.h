@@ -10,10 +10,11 @@
 
 #include "atlas/density.h"
 #include "atlas/layout.h"
+#include "base/atlas_codec.h"
 #include "base/frame_number.h"
 #include "base/status.h"
 #include "base/view.h"
-#include "codec/video_encoder.h"
+#include "codec/atlas_encoder.h"
 #include "geometry-compression/meta_codec.h"
 #include "pvs/prediction.h"
 #include "pvs/visibility.h"
@@ -31,7 +32,8 @@ struct SessionSettings {
   pvs::VisibilitySettings visibility;
   shading::GatherPath gather_path = shading::GatherPath::automatic;
   RateSplit rate;
-  std::string encoder = "auto";
+  AtlasCodec codec = AtlasCodec::h264;
+  std::string encoder = "auto";  // of H.264
 };
 
 struct FrameInput {
@@ -72,7 +74,7 @@ struct Frame {
 class FrameRenderer {
  public:
   virtual ~FrameRenderer() = default;
-  // Blocks until the frame is encoded. The first frame is a key frame.
+  // Blocks until the frame is encoded. The first frame is a key frame, with JPEG and raw each one.
   virtual StatusOr<Frame> render(const FrameInput& input) = 0;
   // For the frames from now on.
   virtual void set_rate(const RateSplit& rate) = 0;

@@ -30,6 +30,12 @@ class Stopwatch {
   TimeNs last_ = clock_.now();
 };
 
+// Where a placement's samples lie.
+void add_samples(const atlas::Placement& placement, codec::Occupancy& used) {
+  if (placement.kind == atlas::PlacementKind::block)
+    used.add_rectangle(placement.x, placement.y, placement.width(), placement.height());
+}
+
 MetaSettings meta_settings(const SessionSettings& settings) {
   return {.atlas_width = static_cast<uint16_t>(settings.layout.width),
           .atlas_height = static_cast<uint16_t>(settings.layout.height)};
@@ -48,7 +54,8 @@ struct Session::Impl {
   std::unique_ptr<atlas::Layout> layout;
   std::unique_ptr<shading::Gather> gather;
   std::unique_ptr<codec::YuvConverter> converter;
-  std::unique_ptr<codec::VideoEncoder> encoder;
+  std::unique_ptr<codec::AtlasEncoder> encoder;
+  codec::Occupancy used;  // of the atlas; only where the codec asks for it
   std::optional<MetaBuilder> meta;
   bool first = true;
 
@@ -63,6 +70,7 @@ struct Session::Impl {
   Status set_up();
   Status find_visible(const FrameInput& input, FrameStats& stats);
   Status shade(const Pose& pose, FrameStats& stats);
+  codec::AtlasPicture coded_picture();
   Status encode(const FrameInput& input, const atlas::LayoutDelta& delta, Frame& frame);
 };
 
@@ -85,12 +93,14 @@ Status Session::Impl::set_up() {
       gather, shading::Gather::create(device, scene->gpu_scene(), scene->lighting(), gather_settings));
   TESSERA_ASSIGN_OR_RETURN(
       converter, codec::YuvConverter::create(device, settings.layout.width, settings.layout.height));
-  const codec::VideoSettings video{.width = settings.layout.width,
-                                   .height = settings.layout.height,
-                                   .frames_per_second = settings.rate.frames_per_second,
-                                   .bitrate_bps = settings.rate.bitrate_bps,
-                                   .encoder = settings.encoder};
-  TESSERA_ASSIGN_OR_RETURN(encoder, codec::VideoEncoder::create(video));
+  const codec::EncoderSettings video{.width = settings.layout.width,
+                                     .height = settings.layout.height,
+                                     .frames_per_second = settings.rate.frames_per_second,
+                                     .bitrate_bps = settings.rate.bitrate_bps,
+                                     .encoder = settings.encoder};
+  TESSERA_ASSIGN_OR_RETURN(encoder, codec::AtlasEncoder::create(settings.codec, video));
+  if (settings.codec == AtlasCodec::jpeg)
+    used = codec::Occupancy(settings.layout.width, settings.layout.height);
   meta.emplace(scene->scene(), meta_settings(settings));
   return absl::OkStatus();
 }
@@ -135,6 +145,14 @@ Status Session::Impl::shade(const Pose& pose, FrameStats& stats) {
   return absl::OkStatus();
 }
 
+codec::AtlasPicture Session::Impl::coded_picture() {
+  if (settings.codec != AtlasCodec::jpeg)
+    return converter->result();  // video codes what stands still for nothing
+  used.clear();
+  for (const atlas::Placement& placement : layout->placements()) add_samples(placement, used);
+  return {converter->result(), &used};
+}
+
 Status Session::Impl::encode(const FrameInput& input, const atlas::LayoutDelta& delta, Frame& frame) {
   geometry_compression::MetaFrame values = meta->build(
       frame.number, delta, {layout->placements(), gather->colors()}, instant->instance_transforms());
@@ -142,11 +160,12 @@ Status Session::Impl::encode(const FrameInput& input, const atlas::LayoutDelta& 
       static_cast<uint32_t>(static_cast<uint64_t>(to_seconds(input.poses.back().time_ns) * kRtpClockHz));
   frame.meta = geometry_compression::encode(values, &frame.stats.meta_bits);
 
-  const bool key_frame = std::exchange(first, false) || input.key_frame;
+  // Only video has frames that cost more than others because nothing came before them.
+  const bool key_frame =
+      (std::exchange(first, false) || input.key_frame) && settings.codec == AtlasCodec::h264;
   const double budget = settings.rate.at_interval(input.interval_ns)
                             .atlas_bits(8.0 * static_cast<double>(frame.meta.size()), key_frame);
-  TESSERA_ASSIGN_OR_RETURN(frame.atlas,
-                           encoder->encode(frame.number, converter->result(), budget, key_frame));
+  TESSERA_ASSIGN_OR_RETURN(frame.atlas, encoder->encode(frame.number, coded_picture(), budget, key_frame));
   return absl::OkStatus();
 }
 

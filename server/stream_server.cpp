@@ -57,11 +57,11 @@ struct MediaStream {
   std::optional<transport::SrtpKeys> srtp;
 };
 
-StatusOr<MediaStream> make_stream(const RateSplit& rate, bool encrypted) {
+StatusOr<MediaStream> make_stream(AtlasCodec codec, const RateSplit& rate, bool encrypted) {
   MediaStream stream;
   std::array<uint8_t, 8> seed{};
   TESSERA_RETURN_IF_ERROR(fill_random(seed));
-  transport::RtpSenderSettings rtp{.pacer = {.rate_bps = rate.bitrate_bps}};
+  transport::RtpSenderSettings rtp{.codec = codec, .pacer = {.rate_bps = rate.bitrate_bps}};
   std::copy(seed.begin(), seed.end(), reinterpret_cast<uint8_t*>(&rtp.seed));
   TESSERA_ASSIGN_OR_RETURN(stream.sender, transport::RtpSender::create(rtp));
   if (encrypted) {
@@ -235,7 +235,7 @@ StatusOr<Entry> StreamServer::Impl::find_token(const SessionToken& token) const 
 StatusOr<transport::Welcome> StreamServer::Impl::open_media(const Entry& entry) {
   const SessionSettings& s = entry.session->settings();
   const RateSplit rate = entry.session->rate();
-  TESSERA_ASSIGN_OR_RETURN(MediaStream stream, make_stream(rate, settings.meta.tls != nullptr));
+  TESSERA_ASSIGN_OR_RETURN(MediaStream stream, make_stream(s.codec, rate, settings.meta.tls != nullptr));
   const transport::StreamIds ids = stream.sender->ids();
   TESSERA_RETURN_IF_ERROR(media->add_session(entry.session->id(), entry.token, std::move(stream.sender),
                                              media_events(entry.session), stream.srtp));
@@ -244,6 +244,7 @@ StatusOr<transport::Welcome> StreamServer::Impl::open_media(const Entry& entry) 
                             .stream = ids,
                             .atlas_width = static_cast<uint16_t>(s.layout.width),
                             .atlas_height = static_cast<uint16_t>(s.layout.height),
+                            .codec = s.codec,
                             .frames_per_second = static_cast<float>(rate.frames_per_second),
                             .srtp = stream.srtp};
 }
@@ -367,7 +368,12 @@ StatusOr<SessionTicket> StreamServer::create_session(RendererFactory renderer,
 StatusOr<Forwarding> StreamServer::forward(SessionId session, const transport::PeerAddress& to) {
   Impl& s = *impl_;
   transport::SdpSettings sdp{.address = transport::to_string(to), .port = to.port, .retransmission = false};
-  TESSERA_RETURN_IF_ERROR(s.find(session).status());
+  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<StreamedSession> found, s.find(session));
+  if (const AtlasCodec codec = found->settings().codec; codec != AtlasCodec::h264) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("session ", session, " streams ", std::string(name_of(codec)),
+                     ", which players do not know: forward a session whose codec is H.264"));
+  }
   const std::optional<transport::StreamIds> ids = s.media->stream_ids(session);
   if (!ids) {
     return absl::FailedPreconditionError(

@@ -145,6 +145,7 @@ Bytes encode(const Welcome& m) {
   w.u16(m.stream.first_sequence);
   w.u16(m.atlas_width);
   w.u16(m.atlas_height);
+  w.u8(static_cast<uint8_t>(m.codec));
   w.f32(m.frames_per_second);
   w.u8(m.srtp ? kSrtpAes128Sha1 : kNoSrtp);
   if (m.srtp) {
@@ -168,14 +169,16 @@ StatusOr<Welcome> decode_welcome(std::span<const uint8_t> payload) {
   m.stream.first_sequence = in.u16();
   m.atlas_width = in.u16();
   m.atlas_height = in.u16();
+  const std::optional<AtlasCodec> codec = atlas_codec_from(in.u8());
+  m.codec = codec.value_or(AtlasCodec::h264);
   m.frames_per_second = in.f32();
   const uint8_t srtp = in.u8();
   if (srtp == kSrtpAes128Sha1) {
     read_array(in, m.srtp.emplace().server);
     read_array(in, m.srtp->client);
   }
-  require(in, srtp <= kSrtpAes128Sha1 && m.stream.payload_type < 128 && m.stream.rtx_payload_type < 128 &&
-                  m.frames_per_second > 0 && m.frames_per_second <= 1000);
+  require(in, codec && srtp <= kSrtpAes128Sha1 && m.stream.payload_type < 128 &&
+                  m.stream.rtx_payload_type < 128 && m.frames_per_second > 0 && m.frames_per_second <= 1000);
   return finished(in, m, "welcome");
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/atlas_codec.h"
 #include "base/frame_number.h"
 #include "base/frame_record.h"
 #include "base/status.h"
@@ -52,8 +53,9 @@ struct Welcome {
   uint16_t media_port = 0;  // UDP, at the server's address
   StreamIds stream;
   uint16_t atlas_width = 0, atlas_height = 0;  // pixels
-  float frames_per_second = 0;                 // of the server
-  std::optional<SrtpKeys> srtp;                // only over TLS
+  AtlasCodec codec = AtlasCodec::h264;
+  float frames_per_second = 0;   // of the server
+  std::optional<SrtpKeys> srtp;  // only over TLS
 };
 
 constexpr size_t kMaxTimings = 256;  // in one message

@@ -22,7 +22,7 @@ struct RtpReceiver::Impl {
       : settings(s),
         own_ssrc(static_cast<uint32_t>(std::mt19937_64(s.seed)())),
         nack(s.nack),
-        depacketizer(s.max_frame_bytes),
+        depacketizer(Depacketizer::create(s.codec, s.max_frame_bytes)),
         report_timer(s.report_interval_ns, s.seed) {
     if (s.ssrc) media.emplace(*s.ssrc);
     if (s.rtx_ssrc) rtx.emplace(*s.rtx_ssrc);
@@ -55,7 +55,7 @@ struct RtpReceiver::Impl {
   SequenceUnwrapper unwrapper;
   NackGenerator nack;
   ReorderBuffer buffer;
-  H264Depacketizer depacketizer;
+  std::unique_ptr<Depacketizer> depacketizer;
   ReportTimer report_timer;
   std::deque<ReceivedFrame> frames;
   size_t frame_bytes = 0;
@@ -124,14 +124,14 @@ void RtpReceiver::Impl::begin_stream(uint16_t sequence) {
   if (static_cast<uint16_t>(sequence - first) > settings.nack.max_missing) return;
   const ExtendedSequence begin = unwrapper.unwrap(first);
   nack.begin(begin);
-  depacketizer.begin(begin);
+  depacketizer->begin(begin);
 }
 
 void RtpReceiver::Impl::restart_stream() {
   unwrapper = {};
   nack.restart();
   buffer.restart();
-  depacketizer = H264Depacketizer(settings.max_frame_bytes);
+  depacketizer = Depacketizer::create(settings.codec, settings.max_frame_bytes);
   wants_key_frame = true;
 }
 
@@ -155,7 +155,7 @@ void RtpReceiver::Impl::release() {
   stats.given_up = nack.given_up();
   std::vector<ReceivedFrame> done;
   while (auto stored = buffer.take_before(nack.oldest_missing()))
-    depacketizer.push(stored->arrival_ns, stored->sequence, {stored->header, stored->payload}, done);
+    depacketizer->push(stored->arrival_ns, stored->sequence, {stored->header, stored->payload}, done);
   for (ReceivedFrame& frame : done) add_frame(std::move(frame));
 }
 

@@ -9,16 +9,18 @@
 #include <string>
 #include <vector>
 
+#include "base/atlas_codec.h"
 #include "base/status.h"
 #include "base/time.h"
-#include "transport/h264_depacketizer.h"
+#include "transport/depacketizer.h"
 #include "transport/nack_generator.h"
 #include "transport/rtp_packet.h"
 
 namespace tessera::transport {
 
 struct RtpReceiverSettings {
-  uint64_t seed = 0;  // of its own SSRC and report times
+  uint64_t seed = 0;                    // of its own SSRC and report times
+  AtlasCodec codec = AtlasCodec::h264;  // decides the payload format
   uint8_t payload_type = 96, rtx_payload_type = 97;
   // What the sender said in its welcome. Empty: the first packet of each payload type decides.
   std::optional<uint32_t> ssrc, rtx_ssrc;
@@ -31,7 +33,7 @@ struct RtpReceiverSettings {
   DurationNs key_frame_retry_ns = 200 * kNsPerMs;  // between requests; or two round trips, if that is longer
   size_t max_buffered_packets = 8192;  // that wait for a missing one; then the oldest gap is given up
   size_t max_buffered_bytes = 8u << 20;
-  size_t max_frame_bytes = H264Depacketizer::kDefaultMaxFrameBytes;
+  size_t max_frame_bytes = Depacketizer::kDefaultMaxFrameBytes;
   // That wait for take_frame(); then the oldest are dropped. A gap of give_up_ns releases as many at once.
   size_t max_frames = 256, max_queued_frame_bytes = 32u << 20;
 };

@@ -6,6 +6,7 @@
 
 #include "transport/h264_packetizer.h"
 #include "transport/ntp_time.h"
+#include "transport/picture_payload.h"
 #include "transport/receiver_statistics.h"
 #include "transport/report_timer.h"
 
@@ -108,6 +109,10 @@ const StreamIds& RtpSender::ids() const {
   return impl_->ids;
 }
 
+AtlasCodec RtpSender::codec() const {
+  return impl_->settings.codec;
+}
+
 double RtpSender::frame_budget_bits(DurationNs frame_interval_ns, bool key_frame) const {
   return impl_->pacer.frame_budget_bits(frame_interval_ns, key_frame);
 }
@@ -120,13 +125,15 @@ StatusOr<uint32_t> RtpSender::send_frame(TimeNs now, TimeNs capture_ns, std::spa
                                          bool key_frame) {
   Impl& s = *impl_;
   const size_t max_payload = s.settings.max_datagram_bytes - kRtpHeaderBytes - kRtxHeaderBytes;
-  const std::vector<H264Payload> payloads = packetize_h264(access_unit, max_payload);
-  if (payloads.empty()) return absl::InvalidArgumentError("RtpSender: an access unit without NAL units");
+  const std::vector<RtpPayload> payloads = s.settings.codec == AtlasCodec::h264
+                                               ? packetize_h264(access_unit, max_payload)
+                                               : packetize_picture(access_unit, max_payload);
+  if (payloads.empty()) return absl::InvalidArgumentError("RtpSender: an access unit without content");
 
   std::vector<PacedPacket> packets;
   packets.reserve(payloads.size());
   ExtendedSequence sequence = s.next_sequence;
-  for (const H264Payload& payload : payloads) {
+  for (const RtpPayload& payload : payloads) {
     PacedPacket packet{.sequence = sequence++};
     packet.bytes.reserve(kRtpHeaderBytes + payload.size());
     write_rtp_header({payload.last, s.ids.payload_type, static_cast<uint16_t>(packet.sequence),

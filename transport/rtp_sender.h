@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/atlas_codec.h"
 #include "base/status.h"
 #include "base/time.h"
 #include "transport/pacer.h"
@@ -29,6 +30,7 @@ struct StreamIds {
 struct RtpSenderSettings {
   uint64_t seed =
       0;  // of SSRCs, first sequence numbers and the timestamp offset; give every session another one
+  AtlasCodec codec = AtlasCodec::h264;  // decides the payload format
   uint8_t payload_type = 96, rtx_payload_type = 97;
   size_t max_datagram_bytes = 1200;  // of UDP payload, retransmissions included; 64..65507
   std::string cname = "tessera";     // up to 255 bytes
@@ -68,12 +70,13 @@ class RtpSender {
   ~RtpSender();
 
   const StreamIds& ids() const;
+  AtlasCodec codec() const;
 
   // See Pacer::frame_budget_bits: ask before encoding, and drop the frame there if the budget is too small.
   double frame_budget_bits(DurationNs frame_interval_ns, bool key_frame) const;
-  // Queues a whole access unit (Annex B); `capture_ns` becomes its RTP timestamp, which is returned.
-  // ResourceExhausted: the pacer's queue is full; nothing of it is sent and the stream needs a key frame.
-  // InvalidArgument: no NAL unit.
+  // Queues a whole access unit (H.264: Annex B; else a picture packet); `capture_ns` becomes its RTP
+  // timestamp, which is returned. ResourceExhausted: the pacer's queue is full; nothing of it is sent and the
+  // stream needs a key frame. InvalidArgument: no NAL unit, or an empty packet.
   StatusOr<uint32_t> send_frame(TimeNs now, TimeNs capture_ns, std::span<const uint8_t> access_unit,
                                 bool key_frame);
   void set_rate(double rate_bps);

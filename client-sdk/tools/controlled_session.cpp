@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "client-sdk/tools/made_ticket.h"
+#include "proto/atlas_codec.h"
 #include "proto/control_access.h"
 #include "transport/asio/endpoint.h"
 

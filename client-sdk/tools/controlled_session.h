@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/atlas_codec.h"
 #include "base/status.h"
 #include "client-sdk/ticket.h"
 #include "proto/frame_reader.h"

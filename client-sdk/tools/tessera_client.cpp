@@ -18,6 +18,7 @@
 #include "client-sdk/tools/controlled_session.h"
 #include "client-sdk/tools/picture_writer.h"
 #include "codec/yuv.h"
+#include "proto/atlas_codec.h"
 
 namespace {
 
@@ -39,6 +40,7 @@ Exit codes: 0 done, 1 the stream failed, 2 wrong usage.)";
 
 struct Settings {
   client::ControlSettings control;
+  AtlasCodec codec = AtlasCodec::h264;
   std::string scene, ticket, path, out, json, frames_csv, trace;
   bool print_ticket = false, stereo = false;
   double eye_distance_mm = 63, foveation = 0;
@@ -75,6 +77,7 @@ v1::SessionSettings session_settings(const Settings& s) {
   v1::SessionSettings wanted;
   wanted.mutable_density()->set_foveation(s.foveation);
   if (s.bias) wanted.mutable_density()->set_bias(*s.bias);
+  wanted.set_codec(to_proto(s.codec));
   return wanted;
 }
 
@@ -318,6 +321,14 @@ int main(int argc, char** argv) {
   app.add_flag("--insecure", s.control.insecure, "send the control token in clear text beyond loopback");
   CLI::Option* scene =
       app.add_option("--scene", s.scene, "view a scene that the daemon holds, in a new session");
+  std::vector<std::string> codecs;
+  for (const auto& [codec, name] : kAtlasCodecs) codecs.emplace_back(name);
+  app.add_option_function<std::string>(
+         "--codec", [&s](const std::string& name) { s.codec = *atlas_codec_from(name); },
+         "with --scene: how the new session codes its atlas")
+      ->check(CLI::IsMember(codecs))
+      ->default_str(std::string(name_of(s.codec)))
+      ->needs(scene);
   app.add_option("--ticket", s.ticket, "view the session of this ticket: tessera://HOST:PORT/TOKEN[?ca=FILE]")
       ->envname("TESSERA_TICKET")
       ->excludes(scene)

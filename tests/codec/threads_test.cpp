@@ -5,6 +5,8 @@
 #include <thread>
 #include <vector>
 
+#include "codec/jpeg_decoder.h"
+#include "codec/jpeg_encoder.h"
 #include "codec/video_decoder.h"
 #include "codec/video_encoder.h"
 #include "codec/yuv.h"
@@ -54,6 +56,22 @@ TEST(CodecThreads, StreamsDoNotDisturbEachOther) {
   for (const Outcome& outcome : outcomes) {
     EXPECT_EQ(outcome.decoded, kFrames);
     EXPECT_EQ(outcome.after_noise.code(), absl::StatusCode::kInvalidArgument) << outcome.after_noise;
+  }
+}
+
+// Encoder and decoder share a picture out among threads of their own.
+TEST(CodecThreads, JpegTilesAreWorkedOnSideBySide) {
+  constexpr uint32_t kWidth = 512, kHeight = 1024;  // two tiles
+  auto encoder = JpegEncoder::create(kWidth, kHeight);
+  ASSERT_TRUE(encoder.ok());
+  JpegDecoder decoder(kWidth, kHeight);
+  for (FrameNumber n = 0; n < 3; ++n) {
+    const YuvImage original = atlas_picture(kWidth, kHeight, n, 20);
+    const auto unit = (*encoder)->encode(n, view_of(original), 1e6, false);
+    ASSERT_TRUE(unit.ok()) << unit.status();
+    const auto frame = decoder.decode(unit->bytes);
+    ASSERT_TRUE(frame.ok()) << frame.status();
+    EXPECT_GT(psnr(view_of(original), frame->picture), 30);
   }
 }
 

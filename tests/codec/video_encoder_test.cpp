@@ -30,22 +30,23 @@ double bits(const AccessUnit& unit) {
 }
 
 TEST(VideoEncoder, RefusesSettingsOutsideTheirRange) {
-  const VideoSettings good{.width = 64, .height = 64};
-  const auto code = [](const VideoSettings& s) { return VideoEncoder::create(s).status().code(); };
-  for (auto change : std::initializer_list<void (*)(VideoSettings&)>{
-           [](VideoSettings& s) { s.width = 0; }, [](VideoSettings& s) { s.width = 63; },
-           [](VideoSettings& s) { s.height = 65; }, [](VideoSettings& s) { s.height = 1u << 20; },
-           [](VideoSettings& s) { s.frames_per_second = 0; },
-           [](VideoSettings& s) { s.frames_per_second = NAN; }, [](VideoSettings& s) { s.bitrate_bps = -1; },
-           [](VideoSettings& s) { s.bitrate_bps = 1e12; }, [](VideoSettings& s) { s.encoder = "theora"; }}) {
-    VideoSettings s = good;
+  const EncoderSettings good{.width = 64, .height = 64};
+  const auto code = [](const EncoderSettings& s) { return VideoEncoder::create(s).status().code(); };
+  for (auto change : std::initializer_list<void (*)(EncoderSettings&)>{
+           [](EncoderSettings& s) { s.width = 0; }, [](EncoderSettings& s) { s.width = 63; },
+           [](EncoderSettings& s) { s.height = 65; }, [](EncoderSettings& s) { s.height = 1u << 20; },
+           [](EncoderSettings& s) { s.frames_per_second = 0; },
+           [](EncoderSettings& s) { s.frames_per_second = NAN; },
+           [](EncoderSettings& s) { s.bitrate_bps = -1; }, [](EncoderSettings& s) { s.bitrate_bps = 1e12; },
+           [](EncoderSettings& s) { s.encoder = "theora"; }}) {
+    EncoderSettings s = good;
     change(s);
     EXPECT_EQ(code(s), absl::StatusCode::kInvalidArgument);
   }
-  VideoSettings vaapi = good;
+  EncoderSettings vaapi = good;
   vaapi.encoder = "vaapi";
   EXPECT_EQ(code(vaapi), absl::StatusCode::kUnavailable);
-  VideoSettings preset = good;
+  EncoderSettings preset = good;
   preset.encoder = "x264";
   preset.preset = "no-such-preset";
   EXPECT_FALSE(VideoEncoder::create(preset).ok());

@@ -88,6 +88,27 @@ TEST(Loopback, ALossyLinkStillKeepsPairsWhole) {
   EXPECT_EQ(result.rows[0].frames_displayed, 30u);
 }
 
+TEST(Loopback, JpegKeepsItsBudgetAndPairsStayWhole) {
+  LoopbackSettings s = small(0.15);
+  s.codec = AtlasCodec::jpeg;
+  const LoopbackResult result = run(s);
+  const Row& row = result.rows[0];
+  EXPECT_EQ(row.violations, 0u);
+  EXPECT_GT(row.error.mssim, 0.8);
+  EXPECT_LE(row.mbps_total, 10 * 1.1) << "no key frames that cost more";
+  EXPECT_LT(result.split[0].added, 0.1) << "coding";
+}
+
+TEST(Loopback, RawHasNoCodingError) {
+  LoopbackSettings s = small(0.05);
+  s.codec = AtlasCodec::raw;
+  s.bitrate_mbps = 500;
+  const LoopbackResult result = run(s);
+  EXPECT_EQ(result.rows[0].violations, 0u);
+  EXPECT_EQ(result.split[0].cause, "coding");
+  EXPECT_EQ(result.split[0].added, 0);
+}
+
 TEST(Loopback, AMissingSceneNamesTheFile) {
   LoopbackSettings s = small(0.1);
   s.scene = "no/such/scene.glb";

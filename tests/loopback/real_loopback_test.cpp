@@ -52,6 +52,14 @@ TEST(RealLoopback, EveryFramesDurationsTileItsTime) {
   EXPECT_FALSE(result->plan.empty());
 }
 
+TEST(RealLoopback, JpegGoesTheWholeWay) {
+  const auto result = run({.scene = "gallery:0", .codec = AtlasCodec::jpeg});
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_GT(result->rows[0].frames_displayed, 0u);
+  ASSERT_FALSE(result->frames.empty());
+  EXPECT_GT(result->frames[0].mssim.at("tessera"), 0.7);
+}
+
 // Pictures of a client that stands still in a scene that does, too, depend on nothing but the frame's number,
 // as long as the server keeps its rate: a late frame may have more bits (RateSplit::at_interval).
 TEST(RealLoopback, PicturesAreThoseOfTheVirtualClock) {

@@ -52,6 +52,42 @@ TEST_F(DaemonTest, FromLoadToPictureToUnload) {
   EXPECT_EQ(unload("hall").error_code(), grpc::StatusCode::NOT_FOUND);
 }
 
+TEST_F(DaemonTest, ASessionHasTheCodecItWasMadeWith) {
+  start({.scenes = {"hall=gallery:0"}});
+  const auto create_with = [&](v1::AtlasCodec codec, uint32_t width, v1::Ticket* ticket) {
+    grpc::ClientContext context;
+    v1::CreateSessionRequest request;
+    request.set_scene("hall");
+    request.mutable_settings()->set_codec(codec);
+    request.mutable_settings()->set_atlas_width(width);
+    request.mutable_settings()->set_atlas_height(width / 2);
+    return control_->CreateSession(&context, request, ticket);
+  };
+  v1::Ticket video, jpeg;
+  ASSERT_TRUE(create_with(v1::ATLAS_CODEC_UNSPECIFIED, 512, &video).ok());
+  EXPECT_EQ(get(video.session()).settings().codec(), v1::ATLAS_CODEC_H264) << "the default, reported back";
+  ASSERT_TRUE(create_with(v1::ATLAS_CODEC_JPEG, 512, &jpeg).ok());
+  EXPECT_EQ(get(jpeg.session()).settings().codec(), v1::ATLAS_CODEC_JPEG);
+
+  auto client = connect(jpeg);
+  ASSERT_TRUE(client.ok()) << client.status();
+  EXPECT_EQ((*client)->welcome().codec, AtlasCodec::jpeg);
+  EXPECT_NE(first_pair(**client), nullptr) << (*client)->status();
+  EXPECT_NE(get(jpeg.session()).encoder().find("JPEG"), std::string::npos) << get(jpeg.session()).encoder();
+
+  v1::SessionSettings wanted;
+  wanted.set_codec(v1::ATLAS_CODEC_H264);
+  expect_refused(update(jpeg.session(), wanted), grpc::StatusCode::FAILED_PRECONDITION, "ATLAS_CODEC_JPEG");
+  wanted.set_codec(v1::ATLAS_CODEC_JPEG);
+  wanted.set_bitrate_mbps(3);
+  EXPECT_TRUE(update(jpeg.session(), wanted).ok());
+
+  v1::Ticket ignored;
+  expect_refused(create_with(v1::ATLAS_CODEC_RAW, 4096, &ignored), grpc::StatusCode::INVALID_ARGUMENT, "RAW");
+  expect_refused(create_with(static_cast<v1::AtlasCodec>(9), 512, &ignored),
+                 grpc::StatusCode::INVALID_ARGUMENT, "9");
+}
+
 TEST_F(DaemonTest, WatchersOfFramesGetEachRecordOnce) {
   start({.scenes = {"hall=gallery:0"}});
   v1::Ticket ticket;
@@ -267,6 +303,8 @@ TEST_F(DaemonTest, TheViewerProgramWritesPictures) {
   const auto json = nlohmann::json::parse(in, nullptr, false);
   EXPECT_GT(json.value("frames_displayed", 0), 0);
   EXPECT_EQ(json.value("decode_errors", -1), 0);
+  EXPECT_EQ(run("--scene hall --codec jpeg --seconds 0.1 --json /dev/null"), 0);
+  EXPECT_EQ(run("--scene hall --codec gif 2>/dev/null"), 2);
   EXPECT_EQ(run("--scene attic 2>/dev/null"), 1);
   EXPECT_EQ(run("--scene hall --fps 0 2>/dev/null"), 2);
   std::filesystem::remove_all(folder);

@@ -67,7 +67,7 @@ gc::MetaFrame scene(const FakeRendererSettings& s, uint32_t width, uint32_t heig
 class FakeRenderer final : public FrameRenderer {
  public:
   FakeRenderer(const FakeRendererSettings& fake, const SessionSettings& settings,
-               std::unique_ptr<codec::VideoEncoder> encoder)
+               std::unique_ptr<codec::AtlasEncoder> encoder)
       : fake_(fake), settings_(settings), encoder_(std::move(encoder)) {}
 
   void set_rate(const RateSplit& rate) override { settings_.rate = rate; }
@@ -90,7 +90,7 @@ class FakeRenderer final : public FrameRenderer {
  private:
   const FakeRendererSettings fake_;
   SessionSettings settings_;
-  std::unique_ptr<codec::VideoEncoder> encoder_;
+  std::unique_ptr<codec::AtlasEncoder> encoder_;
   bool first_ = true;
 };
 
@@ -99,12 +99,13 @@ class FakeRenderer final : public FrameRenderer {
 RendererFactory fake_renders(const FakeRendererSettings& fake) {
   return [fake](const SessionSettings& settings) -> StatusOr<std::unique_ptr<FrameRenderer>> {
     TESSERA_ASSIGN_OR_RETURN(
-        auto encoder, codec::VideoEncoder::create({.width = settings.layout.width,
-                                                   .height = settings.layout.height,
-                                                   .frames_per_second = settings.rate.frames_per_second,
-                                                   .bitrate_bps = settings.rate.bitrate_bps,
-                                                   .encoder = "x264",
-                                                   .preset = "ultrafast"}));
+        auto encoder,
+        codec::AtlasEncoder::create(settings.codec, {.width = settings.layout.width,
+                                                     .height = settings.layout.height,
+                                                     .frames_per_second = settings.rate.frames_per_second,
+                                                     .bitrate_bps = settings.rate.bitrate_bps,
+                                                     .encoder = "x264",
+                                                     .preset = "ultrafast"}));
     return std::make_unique<FakeRenderer>(fake, settings, std::move(encoder));
   };
 }

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
+#include "codec/atlas_decoder.h"
 #include "codec/video_decoder.h"
 #include "scene/procedural.h"
 
@@ -92,6 +95,41 @@ TEST_F(SessionTest, FramesDecodeOnTheOtherSide) {
     EXPECT_EQ(meta.placements.size(), n == 0 ? 1u : 0u) << "a still view moves nothing";
   }
   EXPECT_EQ(session->placements().size(), 1u);
+}
+
+// Raw is the converter's planes to the byte. JPEG need be like them only where samples lie.
+TEST_F(SessionTest, PicturesThatStandByThemselvesDecodeInAnyOrder) {
+  for (const AtlasCodec codec : {AtlasCodec::jpeg, AtlasCodec::raw}) {
+    auto quad = make_quad();
+    quad->index_instances();
+    SessionSettings settings = small_settings();
+    settings.codec = codec;
+    auto session = must(Session::create(must(SharedScene::create(device(), quad)), settings));
+    auto decoder = must(codec::AtlasDecoder::create(codec));
+    const std::vector<TimedPose> poses = {{0, Pose{}}};
+    std::vector<Frame> frames;
+    for (FrameNumber n = 0; n < 3; ++n) frames.push_back(must(session->render(input(n, poses))));
+    ASSERT_EQ(session->placements().size(), 1u);
+    const atlas::Placement placed = session->placements()[0];
+    const YuvView coded = session->yuv();
+    for (const FrameNumber n : {2u, 0u, 1u}) {
+      EXPECT_TRUE(frames[n].atlas.key_frame);
+      const auto decoded = must(decoder->decode(frames[n].atlas.bytes));
+      EXPECT_EQ(decoded.frame, n);
+      ASSERT_EQ(decoded.picture.width, 512u);
+      int largest = 0;
+      for (uint32_t y = placed.y; y < placed.y + placed.height(); ++y)
+        for (uint32_t x = placed.x; x < placed.x + placed.width(); ++x)
+          largest = std::max(largest, std::abs(coded.y[size_t{y} * coded.y_stride + x] -
+                                               decoded.picture.y[size_t{y} * decoded.picture.y_stride + x]));
+      EXPECT_LE(largest, codec == AtlasCodec::raw ? 0 : 4) << name_of(codec);
+    }
+    if (codec == AtlasCodec::jpeg) {
+      EXPECT_LT(frames[0].atlas.bytes.size(), 2500u) << "one block of the atlas is used";
+      EXPECT_EQ(frames[0].atlas.bytes.size(), frames[2].atlas.bytes.size())
+          << "no frame costs more than another";
+    }
+  }
 }
 
 TEST_F(SessionTest, KeyFrameOnRequest) {

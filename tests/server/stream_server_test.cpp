@@ -11,6 +11,7 @@
 #include "scene/procedural.h"
 #include "server/session.h"
 #include "streaming_fixture.h"
+#include "transport/asio/endpoint.h"
 
 namespace tessera::server {
 namespace {
@@ -482,6 +483,54 @@ TEST_F(StreamServerTest, OtherAddressesThanLoopbackNeedTlsOrAWordOfConsent) {
   settings.insecure = true;
   EXPECT_TRUE(StreamServer::create(settings, clock_).ok());
 }
+
+class CodecStreaming : public test::FakeStreamingTest, public testing::WithParamInterface<AtlasCodec> {
+ protected:
+  SessionSettings settings() const {
+    SessionSettings s = test::small_session();
+    s.codec = GetParam();
+    if (s.codec == AtlasCodec::raw) s.rate.bitrate_bps = 40e6;  // 394 kbit a frame
+    return s;
+  }
+};
+
+// The client learns of the codec from the welcome alone.
+TEST_P(CodecStreaming, PairsArriveWholeAndAKeyFrameRequestCostsNothing) {
+  start();
+  const SessionTicket made = ticket({}, settings());
+  auto client = connect(made);
+  ASSERT_TRUE(client.ok()) << client.status();
+  EXPECT_EQ((*client)->welcome().codec, GetParam());
+  expect_pairs(**client, 5);
+  EXPECT_EQ((*client)->stats().core.decode_errors, 0u);
+  const StreamedSessionStats stats = *server_->stats(made.session);
+  if (GetParam() != AtlasCodec::h264) {
+    EXPECT_GE(stats.key_frames, stats.frames_sent);
+    EXPECT_GT(stats.frames_sent, 0u);
+  }
+}
+
+TEST_P(CodecStreaming, PlayersAreSentVideoOnly) {
+  start();
+  const SessionTicket made = ticket({}, settings());
+  auto client = connect(made);
+  ASSERT_TRUE(client.ok()) << client.status();
+  expect_pairs(**client, 1);
+  const auto loopback = *transport::parse_address("127.0.0.1");
+  const auto to = transport::peer_address({loopback, 40000});
+  const auto forwarding = server_->forward(made.session, to);
+  if (GetParam() == AtlasCodec::h264) {
+    EXPECT_TRUE(forwarding.ok()) << forwarding.status();
+  } else {
+    EXPECT_EQ(forwarding.status().code(), absl::StatusCode::kFailedPrecondition);
+    EXPECT_NE(std::string(forwarding.status().message()).find(std::string(name_of(GetParam()))),
+              std::string::npos);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, CodecStreaming,
+                         testing::Values(AtlasCodec::h264, AtlasCodec::jpeg, AtlasCodec::raw),
+                         [](const auto& info) { return std::string(name_of(info.param)); });
 
 }  // namespace
 }  // namespace tessera::server

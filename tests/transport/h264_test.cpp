@@ -28,7 +28,7 @@ class Stream {
   std::vector<Packet> packets(const Bytes& access_unit, size_t max_payload) {
     std::vector<Packet> out;
     timestamp_ += 3000;
-    for (const H264Payload& p : packetize_h264(access_unit, max_payload)) {
+    for (const RtpPayload& p : packetize_h264(access_unit, max_payload)) {
       Bytes payload(p.prefix, p.prefix + p.prefix_bytes);
       payload.insert(payload.end(), p.body.begin(), p.body.end());
       EXPECT_LE(payload.size(), max_payload);

@@ -36,6 +36,7 @@ Welcome some_welcome() {
   m.stream = {0x11111111, 0x22222222, 96, 97, 0x3333};
   m.atlas_width = 2048;
   m.atlas_height = 1024;
+  m.codec = AtlasCodec::jpeg;
   m.frames_per_second = 30;
   return m;
 }
@@ -51,7 +52,7 @@ constexpr const char* kStereoHello =
     "3f800000 bfa00000 3fc00000 bf400000 3f800000 3d000000 3c800000 00000000 3f000000 3f000000 3f000000 "
     "3f000000 bfc00000 3fa00000 bf400000 3f800000 42900000 0006 766965776572";
 constexpr const char* kWelcome =
-    "0001 0000000000000003 138c 11111111 22222222 60 61 3333 0800 0400 41f00000 00";
+    "0001 0000000000000003 138c 11111111 22222222 60 61 3333 0800 0400 01 41f00000 00";
 
 TEST(Messages, KnownBytes) {
   EXPECT_EQ(encode(some_hello()), from_hex(kHello));
@@ -93,6 +94,7 @@ TEST(Messages, ComeBackAsTheyWere) {
     ASSERT_TRUE(welcome.ok()) << welcome.status();
     EXPECT_EQ(welcome->stream, m.stream);
     EXPECT_EQ(welcome->srtp, m.srtp);
+    EXPECT_EQ(welcome->codec, AtlasCodec::jpeg);
     EXPECT_EQ(welcome->media_port, 5004);
   }
   const std::vector<ClientFrameTimes> timings = {{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12},
@@ -151,6 +153,9 @@ TEST(Messages, ValuesOutsideTheirRangeAreRefused) {
   EXPECT_FALSE(decode_hello(encode(hello)).ok());
   Welcome welcome = some_welcome();
   welcome.frames_per_second = nan;
+  EXPECT_FALSE(decode_welcome(encode(welcome)).ok());
+  welcome = some_welcome();
+  welcome.codec = static_cast<AtlasCodec>(3);
   EXPECT_FALSE(decode_welcome(encode(welcome)).ok());
   EXPECT_FALSE(decode_timings(from_hex("0101")).ok());
   for (const TimeNs far : {kMaxTimeNs + 1, -kMaxTimeNs - 1, std::numeric_limits<TimeNs>::min()}) {

@@ -169,6 +169,22 @@ TEST(Stream, RetransmissionRecoversEverythingAtFivePercentLoss) {
   }
 }
 
+// Pictures that stand by themselves travel likewise, and a lost one costs no other.
+TEST(Stream, PicturePacketsArriveTooAndALostOneCostsNoOther) {
+  Scenario run;
+  run.sender.codec = run.receiver.codec = AtlasCodec::jpeg;
+  run.down = {.delay_ns = 25 * kNsPerMs, .jitter_ns = 2 * kNsPerMs, .loss = 0.05, .seed = 1};
+  const Outcome recovered = Simulation(run).run();
+  EXPECT_GE(complete_frames(recovered), 299u);
+  EXPECT_GT(recovered.down.lost(), 500u);
+
+  run.receiver.nack.max_tries = 0;
+  run.down.loss = 0.001;
+  const Outcome lost = Simulation(run).run();
+  EXPECT_GT(lost.receiver->stats().given_up, 0u);
+  EXPECT_GE(complete_frames(lost), 299u - lost.receiver->stats().given_up);
+}
+
 TEST(Stream, SequenceNumbersMayWrapManyTimesOver) {
   Scenario run;
   run.frames = 1000;

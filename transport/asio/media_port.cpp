@@ -208,6 +208,7 @@ StatusOr<uint32_t> MediaPort::send_frame(SessionId session, TimeNs capture_ns,
 
 void MediaPort::on_sent_frame(Session& session, std::span<const uint8_t> access_unit, bool key_frame,
                               Calls& calls) {
+  if (session.sender->codec() != AtlasCodec::h264) return;  // each picture is a key frame
   const TimeNs now = clock_.now();
   if (key_frame) {
     session.key_frame_ns = now;
