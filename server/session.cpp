@@ -33,7 +33,7 @@ class Stopwatch {
 // Where a placement's samples lie.
 void add_samples(const atlas::Placement& placement, codec::Occupancy& used) {
   if (placement.kind == atlas::PlacementKind::block)
-    used.add_rectangle(placement.x, placement.y, placement.width(), placement.height());
+    used.add_rectangle(placement.x, placement.y, placement.width, placement.height);
 }
 
 MetaSettings meta_settings(const SessionSettings& settings) {

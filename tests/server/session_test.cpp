@@ -118,8 +118,8 @@ TEST_F(SessionTest, PicturesThatStandByThemselvesDecodeInAnyOrder) {
       EXPECT_EQ(decoded.frame, n);
       ASSERT_EQ(decoded.picture.width, 512u);
       int largest = 0;
-      for (uint32_t y = placed.y; y < placed.y + placed.height(); ++y)
-        for (uint32_t x = placed.x; x < placed.x + placed.width(); ++x)
+      for (uint32_t y = placed.y; y < placed.y + placed.height; ++y)
+        for (uint32_t x = placed.x; x < placed.x + placed.width; ++x)
           largest = std::max(largest, std::abs(coded.y[size_t{y} * coded.y_stride + x] -
                                                decoded.picture.y[size_t{y} * decoded.picture.y_stride + x]));
       EXPECT_LE(largest, codec == AtlasCodec::raw ? 0 : 4) << name_of(codec);
