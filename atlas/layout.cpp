@@ -2,6 +2,7 @@
 
 #include "atlas/blocks/layout.h"
 #include "atlas/coherent/layout.h"
+#include "atlas/tessellated/layout.h"
 
 namespace tessera::atlas {
 
@@ -12,6 +13,7 @@ LayoutSettings layout_settings(LayoutKind kind, uint32_t width, uint32_t height)
 
 StatusOr<std::unique_ptr<Layout>> create_layout(const scene::Scene& scene, const LayoutSettings& settings) {
   if (settings.kind == LayoutKind::blocks) return blocks::Layout::create(scene, settings);
+  if (settings.kind == LayoutKind::tessellated) return tessellated::Layout::create(scene, settings);
   return coherent::Layout::create(scene, settings);
 }
 

@@ -14,16 +14,22 @@
 namespace tessera::atlas {
 
 enum class LayoutKind : uint8_t {
-  blocks,    // Shading Atlas Streaming: power-of-two blocks in superblocks and columns
-  coherent,  // rectangles of any even sides in slabs, samples spaced as the eye sees them
+  blocks,       // Shading Atlas Streaming: power-of-two blocks in superblocks and columns
+  coherent,     // rectangles of any even sides in slabs, samples spaced as the eye sees them
+  tessellated,  // Tessellated Shading Streaming: each triangle as an L or two staircases, placed anew each
+                // frame
 };
-constexpr std::string_view kLayoutNames[] = {"blocks", "coherent"};  // by LayoutKind
+constexpr std::string_view kLayoutNames[] = {"blocks", "coherent", "tessellated"};  // by LayoutKind
+
+constexpr float kDefaultSlantedness = 4;
 
 struct LayoutSettings {
   LayoutKind kind = LayoutKind::blocks;
   uint32_t width = 2048, height = 1024;  // texels; blocks: multiples of the superblock's side; at most 8192
   uint8_t superblock_log = 8;            // blocks
   float high_water = 0.96f;              // share of the memory in use above which it is re-placed, in stages
+  float slantedness =
+      kDefaultSlantedness;  // tessellated: longest edge over height above which halves are taken
   LevelSettings levels;
 };
 
@@ -43,6 +49,7 @@ struct LayoutStats {
   uint64_t used_texels = 0;   // in blocks
   uint64_t stack_texels = 0;  // fragmented: free, but not for every block
   uint32_t blocks = 0, colors = 0, colors_out_of_memory = 0;
+  uint32_t halves = 0;         // among the blocks: triangles of kind halves
   uint32_t blocks_halved = 0;  // placed in this frame smaller than wished, for want of memory (layout blocks)
   uint32_t changed = 0, removed = 0;
   bool reset = false;  // this frame re-placed everything, or a stage of it
@@ -56,7 +63,7 @@ class Layout {
   // Places the visible set. Patches that stay visible at their size keep their place. When memory runs out a
   // patch falls back to a single colour.
   virtual LayoutDelta update(const LayoutInput& input) = 0;
-  // All current placements, sorted by patch. Valid until the next update.
+  // All current placements, sorted by patch and part. Valid until the next update.
   virtual std::span<const Placement> placements() const = 0;
   virtual const LayoutStats& stats() const = 0;
 };

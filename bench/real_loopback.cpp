@@ -27,6 +27,18 @@
 namespace tessera::bench {
 namespace {
 
+v1::Layout to_proto(atlas::LayoutKind kind) {
+  switch (kind) {
+    case atlas::LayoutKind::blocks:
+      return v1::LAYOUT_BLOCKS;
+    case atlas::LayoutKind::coherent:
+      return v1::LAYOUT_COHERENT;
+    case atlas::LayoutKind::tessellated:
+      return v1::LAYOUT_TESSELLATED;
+  }
+  return v1::LAYOUT_UNSPECIFIED;
+}
+
 using nlohmann::json;
 
 constexpr std::chrono::milliseconds kPoll{20};
@@ -149,8 +161,7 @@ Status RealLoopback::start_viewer(uint32_t index) {
   request.set_scene("scene");
   request.mutable_settings()->set_atlas_width(s_.atlas.width);
   request.mutable_settings()->set_atlas_height(s_.atlas.height);
-  request.mutable_settings()->set_layout(
-      s_.layout == atlas::LayoutKind::coherent ? v1::LAYOUT_COHERENT : v1::LAYOUT_BLOCKS);
+  request.mutable_settings()->set_layout(to_proto(s_.layout));
   request.mutable_settings()->set_codec(to_proto(s_.codec));
   request.mutable_settings()->set_bitrate_mbps(s_.bitrate_mbps);
   request.mutable_settings()->set_frames_per_second(s_.server_fps);

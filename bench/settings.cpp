@@ -54,7 +54,8 @@ void for_each_option(Settings& s, Visitor&& visit) {
 }
 
 const std::map<std::string, atlas::LayoutKind> kLayouts{{"blocks", atlas::LayoutKind::blocks},
-                                                        {"coherent", atlas::LayoutKind::coherent}};
+                                                        {"coherent", atlas::LayoutKind::coherent},
+                                                        {"tessellated", atlas::LayoutKind::tessellated}};
 const std::map<std::string, AtlasCodec> kCodecs = [] {
   std::map<std::string, AtlasCodec> codecs;
   for (const auto& [codec, name] : kAtlasCodecs) codecs.emplace(name, codec);

@@ -96,7 +96,9 @@ struct ShadingStreamer::Impl {
     if (!meter->wants(newest.time_ns)) return absl::OkStatus();
     const std::span<const View> predicted = session->views();
     CoverageMeter::Frame frame{.from_ns = newest.time_ns, .to_ns = newest.time_ns + session->horizon_ns()};
-    for (const atlas::Placement& p : session->placements()) frame.placed.push_back({p.patch, {}});
+    for (const atlas::Placement& p : session->placements()) {
+      if (frame.placed.empty() || frame.placed.back().patch != p.patch) frame.placed.push_back({p.patch, {}});
+    }
     frame.predicted = session->seen();
 
     View exact = client;

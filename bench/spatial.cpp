@@ -114,15 +114,15 @@ Plane Study::samples_per_pixel(ShadingStreamer& streamer, const shading::Referen
   const std::span<const atlas::Placement> placements = streamer.session().placements();
   const std::vector<dmat4>& transforms = truth_->instant().instance_transforms();
   const auto of_patch = [&](scene::PatchId patch) {
-    const auto placed = std::ranges::lower_bound(placements, patch, {}, &atlas::Placement::patch);
-    if (placed == placements.end() || placed->patch != patch) return 0.0f;
+    const auto placed = std::ranges::equal_range(placements, patch, {}, &atlas::Placement::patch);
+    uint64_t texels = 0;
+    for (const atlas::Placement& p : placed) texels += p.color_texels();
+    if (texels == 0) return 0.0f;
     const uint32_t i = scene_->instance_of(patch);
     const scene::Instance& instance = scene_->instances[i];
     const scene::Geometry& geometry = scene_->geometries[instance.geometry];
     const scene::Footprint size = pvs::footprint(geometry, geometry.patches[patch - instance.first_patch],
                                                  transforms[i], view.pose.position, view.pixels_per_radian());
-    const uint32_t texels =
-        placed->kind == atlas::PlacementKind::color ? 1 : placed->color_width() * placed->color_height();
     return static_cast<float>(texels) / std::max(size.area_px2, 1e-3f);
   };
   scene::PatchId last = scene::kNone;

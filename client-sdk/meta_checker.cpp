@@ -3,9 +3,12 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "atlas/addressing/addressing.h"
+
 namespace tessera::client {
 namespace {
 
+namespace addressing = atlas::addressing;
 using geometry_compression::MetaFrame;
 using geometry_compression::NewMesh;
 using geometry_compression::NewPatch;
@@ -87,6 +90,14 @@ Status check_patch(size_t entry, const NewPatch& patch, size_t vertices, size_t 
   return absl::OkStatus();
 }
 
+Status check_spacing(size_t entry, const PatchPlacement& p) {
+  for (const int code : p.spacing) {
+    if (code < -126 || code > 126)
+      return bad("placements.spacing of entry ", entry, " is ", code, ", not within -126..126");
+  }
+  return absl::OkStatus();
+}
+
 Status check_block(size_t entry, const PatchPlacement& p, uint32_t atlas_width, uint32_t atlas_height) {
   for (const uint32_t side : {p.width, p.height}) {
     if (side < 2 || side > geometry_compression::kMaxBlockSide || side % 2 != 0)
@@ -97,28 +108,87 @@ Status check_block(size_t entry, const PatchPlacement& p, uint32_t atlas_width, 
     return bad("placements.x, y of entry ", entry, " are ", p.x, ", ", p.y, ": a block of ", p.width, "x",
                p.height, " must lie at even texels inside the atlas of ", atlas_width, "x", atlas_height);
   }
-  for (const int code : p.spacing) {
-    if (code < -126 || code > 126)
-      return bad("placements.spacing of entry ", entry, " is ", code, ", not within -126..126");
+  return absl::OkStatus();
+}
+
+Status check_l(size_t entry, const PatchPlacement& p, bool masked, int atlas_width, int atlas_height) {
+  const int level = p.l.level, splits = p.l.splits;
+  if (level < 1 || level > addressing::kMaxTessellationLevel || splits < 1 ||
+      splits > addressing::kMaxSplits) {
+    return bad("placements.l of entry ", entry, " has level ", level, " and splits ", splits,
+               "; they must be 1 to ", addressing::kMaxTessellationLevel, " and 1 to ",
+               addressing::kMaxSplits);
+  }
+  if (p.x % 2 != 0 || p.y % 2 != 0 || p.l.next_y % 2 != 0 || (masked && p.l.turned))
+    return bad("placements.l of entry ", entry, " lies at ", p.x, ", ", p.y, ", next row ", p.l.next_y,
+               "; they must be even, and a masked one not turned");
+  const glm::ivec2 pair = addressing::l_pair_pitch(level);
+  // Of the first pair and the last; a row between them lies between them.
+  const int halves = masked ? 2 * splits * splits : splits * splits + p.l.turned;
+  bool inside = p.x + pair.x <= atlas_width && p.y + pair.y <= atlas_height;
+  if (inside) {
+    const glm::ivec2 last =
+        addressing::l_pair_place((halves - 1) / 2, {p.x, p.y}, p.l.next_y, level, atlas_width);
+    inside = last.y + pair.y <= atlas_height;
+  }
+  if (!inside)
+    return bad("placements.l of entry ", entry, " at ", p.x, ", ", p.y, ", next row ", p.l.next_y,
+               ": its Ls must lie inside the atlas of ", atlas_width, "x", atlas_height);
+  return absl::OkStatus();
+}
+
+Status check_halves(size_t entry, const PatchPlacement& p, int atlas_width, int atlas_height) {
+  const auto& h = p.halves;
+  if (h.apex > 2 || h.foot >= geometry_compression::kFeet || h.across < 1 ||
+      h.across > addressing::kMaxHalfWidth) {
+    return bad("placements.halves of entry ", entry, " has apex ", int{h.apex}, ", foot ", int{h.foot},
+               " and across ", int{h.across}, "; they must be 0 to 2, 0 to 63 and 1 to ",
+               addressing::kMaxHalfWidth);
+  }
+  for (const auto& half : h.half) {
+    if (half.along < 1 || half.along > addressing::kMaxHalfLength)
+      return bad("placements.halves.along of entry ", entry, " is ", half.along, "; it must be 1 to ",
+                 addressing::kMaxHalfLength);
+    const glm::ivec2 size = addressing::half_staircase(h.across, half.along);
+    if (half.y % 2 != 0 || half.x + size.y + 1 > atlas_width || half.y + size.x + 1 > atlas_height)
+      return bad("placements.halves of entry ", entry, " at ", half.x, ", ", half.y,
+                 ": y must be even, and it must lie inside the atlas of ", atlas_width, "x", atlas_height);
   }
   return absl::OkStatus();
 }
 
-Status check_placement(size_t entry, const PatchPlacement& p, size_t patches, const MetaFrame& frame) {
-  TESSERA_RETURN_IF_ERROR(check_id("placements.patch", entry, p.patch, patches));
+// Kinds none and block are for whole patches, l and halves for triangles of them, colours for both.
+Status check_part(size_t entry, const PatchPlacement& p, uint8_t triangles) {
+  const bool of_triangle = p.kind == PlacementKind::l || p.kind == PlacementKind::halves;
+  const uint8_t least = of_triangle ? 1 : 0;
+  const uint8_t most = of_triangle || p.kind == PlacementKind::color ? triangles : 0;
+  if (p.part >= least && p.part <= most) return absl::OkStatus();
+  return bad("placements.part of entry ", entry, " is ", int{p.part}, "; with its kind and patch it must be ",
+             int{least}, " to ", int{most});
+}
+
+}  // namespace
+
+Status MetaChecker::check_placement(size_t entry, const PatchPlacement& p, const Holdings& held) {
+  TESSERA_RETURN_IF_ERROR(check_id("placements.patch", entry, p.patch, held.patches.size()));
+  const PatchTraits& patch = held.patches[p.patch];
+  TESSERA_RETURN_IF_ERROR(check_part(entry, p, patch.triangles));
+  TESSERA_RETURN_IF_ERROR(check_spacing(entry, p));
   switch (p.kind) {
     case PlacementKind::none:
       return absl::OkStatus();
     case PlacementKind::block:
-      return check_block(entry, p, frame.atlas_width, frame.atlas_height);
+      return check_block(entry, p, held.atlas_width, held.atlas_height);
+    case PlacementKind::l:
+      return check_l(entry, p, patch.masked, held.atlas_width, held.atlas_height);
+    case PlacementKind::halves:
+      return check_halves(entry, p, held.atlas_width, held.atlas_height);
     case PlacementKind::color:
       if (p.rgb > 0xffffff) return bad("placements.rgb of entry ", entry, " is ", p.rgb, ", above 0xffffff");
       return absl::OkStatus();
   }
-  return bad("placements.kind of entry ", entry, " is ", static_cast<int>(p.kind), "; it must be 0 to 2");
+  return bad("placements.kind of entry ", entry, " is ", static_cast<int>(p.kind), "; it must be 0 to 4");
 }
-
-}  // namespace
 
 Status MetaChecker::check(const MetaFrame& frame) {
   if (newest_ && !is_newer(frame.frame, *newest_)) {
@@ -148,14 +218,13 @@ Status MetaChecker::check_content(const MetaFrame& frame, Holdings& held) {
   }
   TESSERA_RETURN_IF_ERROR(check_count("meshes", held.meshes.size() + frame.meshes.size(), kMaxMeshes));
   TESSERA_RETURN_IF_ERROR(check_count("vertices", held.vertices + frame.vertices.size(), kMaxVertices));
-  TESSERA_RETURN_IF_ERROR(check_count("objects", held.objects + frame.objects.size(), kMaxObjects));
-  TESSERA_RETURN_IF_ERROR(check_count("patches", held.patches + frame.patches.size(), kMaxPatches));
+  TESSERA_RETURN_IF_ERROR(check_count("objects", held.masked.size() + frame.objects.size(), kMaxObjects));
+  TESSERA_RETURN_IF_ERROR(check_count("patches", held.patches.size() + frame.patches.size(), kMaxPatches));
   held.atlas_width = frame.atlas_width;
   held.atlas_height = frame.atlas_height;
   held.meshes.insert(held.meshes.end(), frame.meshes.begin(), frame.meshes.end());
   held.vertices += frame.vertices.size();
-  held.objects += frame.objects.size();
-  held.patches += frame.patches.size();
+  for (const auto& object : frame.objects) held.masked.push_back(object.masked);
 
   size_t entry = 0;
   for (const auto& mesh : frame.meshes) TESSERA_RETURN_IF_ERROR(check_mesh(entry++, mesh));
@@ -168,16 +237,17 @@ Status MetaChecker::check_content(const MetaFrame& frame, Holdings& held) {
   }
   entry = 0;
   for (const auto& moved : frame.moved) {
-    TESSERA_RETURN_IF_ERROR(check_id("moved.object", entry, moved.object, held.objects));
+    TESSERA_RETURN_IF_ERROR(check_id("moved.object", entry, moved.object, held.masked.size()));
     TESSERA_RETURN_IF_ERROR(check_transform("moved", entry++, moved.transform));
   }
   entry = 0;
   for (const auto& patch : frame.patches) {
-    TESSERA_RETURN_IF_ERROR(check_patch(entry++, patch, held.vertices, held.objects));
+    TESSERA_RETURN_IF_ERROR(check_patch(entry++, patch, held.vertices, held.masked.size()));
+    held.patches.push_back({patch.triangles, held.masked[patch.object]});
   }
   entry = 0;
   for (const auto& placement : frame.placements) {
-    TESSERA_RETURN_IF_ERROR(check_placement(entry++, placement, held.patches, frame));
+    TESSERA_RETURN_IF_ERROR(check_placement(entry++, placement, held));
   }
   return absl::OkStatus();
 }

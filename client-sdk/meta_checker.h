@@ -23,12 +23,20 @@ class MetaChecker {
   void on_missing_frame() { complete_ = false; }
 
  private:
+  struct PatchTraits {
+    uint8_t triangles;
+    bool masked;
+  };
   // What the client holds after a frame.
   struct Holdings {
     std::vector<geometry_compression::NewMesh> meshes;
-    size_t vertices = 0, objects = 0, patches = 0;
+    size_t vertices = 0;
+    std::vector<bool> masked;  // by object
+    std::vector<PatchTraits> patches;
     uint16_t atlas_width = 0, atlas_height = 0;
   };
+  static Status check_placement(size_t entry, const geometry_compression::PatchPlacement& placement,
+                                const Holdings& holdings);
   static Status check_content(const geometry_compression::MetaFrame& frame, Holdings& holdings);
 
   Holdings holdings_;

@@ -67,32 +67,44 @@ void SceneStore::place(const Placement& placement) {
   if (placement.kind == PlacementKind::none) return remove_records(patch);
 
   const ObjectState& object = state_.objects[patch.object];
-  TriangleFields fields{.object = patch.object,
-                        .transposed = placement.transposed,
-                        .masked = object.masked,
-                        .reversed = object.mirrored,
-                        .single_color = placement.kind == PlacementKind::color,
-                        .x = placement.x,
-                        .y = placement.y,
-                        .width = placement.width,
-                        .height = placement.height,
-                        .rgb = placement.rgb};
+  const TriangleFields fields{.object = patch.object,
+                              .transposed = placement.transposed,
+                              .masked = object.masked,
+                              .reversed = object.mirrored,
+                              .single_color = placement.kind == PlacementKind::color,
+                              .x = placement.x,
+                              .y = placement.y,
+                              .width = placement.width,
+                              .height = placement.height,
+                              .l = placement.l,
+                              .halves = placement.halves,
+                              .rgb = placement.rgb};
+  if (placement.part != 0) return place_triangle(placement, placement.part - 1u, fields);
+  for (uint32_t t = 0; t < patch.triangles; ++t) place_triangle(placement, t, fields);
+}
+
+// `fields`: what the patch's triangles have in common.
+void SceneStore::place_triangle(const Placement& placement, uint32_t t, TriangleFields fields) {
+  Patch& patch = patches_[placement.patch];
   const int group = group_of(patch);
   auto& records = state_.records[group];
-  for (uint32_t t = 0; t < patch.triangles; ++t) {
-    for (int corner = 0; corner < 3; ++corner) {
-      const uint8_t of_patch = kTriangles[patch.triangles - 1][t][corner];
-      fields.vertices[corner] = patch.vertices[of_patch];
-      fields.spacing[corner] = of_patch == 0 ? int8_t{0} : placement.spacing[of_patch - 1u];
-    }
-    fields.corner_kind = static_cast<uint8_t>(kFirstCornerKind[patch.triangles - 1] + t);
-    if (patch.records[t] == kNoRecord) {
-      patch.records[t] = static_cast<uint32_t>(records.size());
-      records.emplace_back();
-      owners_[group].push_back(placement.patch << 2 | t);
-    }
-    records[patch.records[t]] = pack(fields);
+  const bool whole = placement.part == 0;
+  for (int corner = 0; corner < 3; ++corner) {
+    const uint8_t of_patch = kTriangles[patch.triangles - 1][t][corner];
+    fields.vertices[corner] = patch.vertices[of_patch];
+    const int of_spacing = whole ? of_patch : corner;
+    fields.spacing[corner] = of_spacing == 0 ? int8_t{0} : placement.spacing[of_spacing - 1];
   }
+  fields.corner_kind = placement.kind == PlacementKind::l ? kCornerL
+                       : placement.kind == PlacementKind::halves
+                           ? kCornerHalves
+                           : static_cast<uint8_t>(kFirstCornerKind[patch.triangles - 1] + t);
+  if (patch.records[t] == kNoRecord) {
+    patch.records[t] = static_cast<uint32_t>(records.size());
+    records.emplace_back();
+    owners_[group].push_back(placement.patch << 2 | t);
+  }
+  records[patch.records[t]] = pack(fields);
 }
 
 void SceneStore::remove_records(Patch& patch) {
@@ -101,7 +113,7 @@ void SceneStore::remove_records(Patch& patch) {
   auto& owners = owners_[group];
   for (uint32_t t = 0; t < patch.triangles; ++t) {
     const uint32_t hole = patch.records[t];
-    if (hole == kNoRecord) return;
+    if (hole == kNoRecord) continue;
     records[hole] = records.back();
     owners[hole] = owners.back();
     patches_[owners[hole] >> 2].records[owners[hole] & 3] = hole;

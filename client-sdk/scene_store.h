@@ -26,7 +26,7 @@ class SceneStore {
     uint32_t object;
     uint8_t triangles;
     std::array<uint32_t, 5> vertices;
-    // Index of each triangle's record in its group, or kNoRecord while the patch is not placed.
+    // Index of each triangle's record in its group, or kNoRecord while it is not placed.
     std::array<uint32_t, 3> records{kNoRecord, kNoRecord, kNoRecord};
   };
   using Placement = geometry_compression::PatchPlacement;
@@ -34,6 +34,7 @@ class SceneStore {
   void forget_everything();
   void append(const geometry_compression::MetaFrame& frame);
   void place(const Placement& placement);
+  void place_triangle(const Placement& placement, uint32_t triangle, TriangleFields fields);
   void remove_records(Patch& patch);
   int group_of(const Patch& patch) const;
 

@@ -107,7 +107,9 @@ std::string read_all(BitReader& in, MetaFrame& out, const MetaLimits& limits) {
 
 // What meta_frame.h demands of a sender.
 [[maybe_unused]] bool valid(const MetaFrame& f) {
-  const auto by_patch = [](const auto& a, const auto& b) { return a.patch >= b.patch; };
+  const auto by_patch = [](const auto& a, const auto& b) {
+    return std::pair(a.patch, a.part) >= std::pair(b.patch, b.part);
+  };
   const auto by_object = [](const auto& a, const auto& b) { return a.object >= b.object; };
   return valid_atlas_side(f.atlas_width) && valid_atlas_side(f.atlas_height) &&
          std::adjacent_find(f.placements.begin(), f.placements.end(), by_patch) == f.placements.end() &&

@@ -57,18 +57,53 @@ struct NewPatch {
 
 constexpr uint16_t kMaxBlockSide = 256;
 
-enum class PlacementKind : uint8_t { none = 0, block = 1, color = 2 };
+constexpr uint8_t kMaxLevel = 64, kMaxSplits = 31;
+constexpr uint8_t kMaxHalfWidth = 128;
+constexpr uint16_t kMaxHalfLength = 1024;
+constexpr uint8_t kFeet = 64;
+
+enum class PlacementKind : uint8_t { none = 0, block = 1, color = 2, l = 3, halves = 4 };
+
+// Kind l (L-packing), at the x and y of the placement: of its pair of Ls.
+struct LPlacement {
+  uint8_t level = 0;    // 1..kMaxLevel
+  uint8_t splits = 0;   // 1..kMaxSplits: splits^2 Ls, which go on at next_y after the end of the row
+  bool turned = false;  // the first is the second of its pair
+  uint16_t next_y = 0;  // even, < 8192; 0 with splits = 1
+  bool operator==(const LPlacement&) const = default;
+};
+
+// Kind halves (Oversampling).
+struct HalfPlacement {
+  uint16_t x = 0, y = 0;  // < 8192, y even
+  uint16_t along = 0;     // intervals between samples along the base: 1..kMaxHalfLength
+  bool turned = false;
+  bool operator==(const HalfPlacement&) const = default;
+};
+struct HalvesPlacement {
+  uint8_t apex = 0;    // corner of the triangle opposite the base: 0..2
+  uint8_t foot = 0;    // of the height, on the base: 0..kFeet - 1
+  uint8_t across = 0;  // intervals along the height: 1..kMaxHalfWidth
+  std::array<HalfPlacement, 2> half{};
+  bool operator==(const HalvesPlacement&) const = default;
+};
 
 struct PatchPlacement {
-  uint32_t patch = 0;
+  uint32_t patch = 0;  // below 2^30 where a placement of the frame has a part
+  // 0: the whole patch (kinds none, block, color); 1..3: the first to third of its triangles (color, l,
+  // halves).
+  uint8_t part = 0;
   PlacementKind kind = PlacementKind::none;
-  // Kind block. Texels: x and y even, < 8192; width and height even, 2..kMaxBlockSide.
+  // Kinds block and l. Texels: x and y even, < 8192. Kind block: width and height even, 2..kMaxBlockSide.
   uint16_t x = 0, y = 0;
   uint16_t width = 0, height = 0;
   bool transposed = false;
-  // Of corners 1..4: log2 of the corner's distance from the eye that the block was made for, over that of
-  // corner 0, in 21 steps an octave; -126..126. 0 for corners that the patch has not.
+  // Kind block: of corners 1..4; l and halves: of the triangle's corners 1 and 2, then 0: log2 of the
+  // corner's distance from the eye that the placement was made for, over that of corner 0, in 21 steps an
+  // octave; -126..126. 0 for corners that the patch has not.
   std::array<int8_t, 4> spacing{};
+  LPlacement l;
+  HalvesPlacement halves;
   uint32_t rgb = 0;  // kind color: 0xBBGGRR, sRGB
   bool operator==(const PatchPlacement&) const = default;
 };
@@ -83,7 +118,7 @@ struct MetaFrame {
   std::vector<NewObject> objects;
   std::vector<MovedObject> moved;  // sorted by object
   std::vector<NewPatch> patches;
-  std::vector<PatchPlacement> placements;  // sorted by patch, each once
+  std::vector<PatchPlacement> placements;  // sorted by patch and part, each once
   bool operator==(const MetaFrame&) const = default;
 };
 

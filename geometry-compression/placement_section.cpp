@@ -12,11 +12,17 @@ namespace tessera::geometry_compression {
 namespace {
 
 constexpr uint32_t kMaxPosition = 8192;
-// `kind` on the wire: the frequent one is 0.
-constexpr uint32_t coded_kind(PlacementKind kind) {
-  return kind == PlacementKind::block ? 0 : kind == PlacementKind::none ? 1 : 2;
-}
+
+// `kind` on the wire: the frequent ones, of whole patches and of triangles, are 0.
 constexpr PlacementKind kKinds[] = {PlacementKind::block, PlacementKind::none, PlacementKind::color};
+constexpr PlacementKind kPartKinds[] = {PlacementKind::l, PlacementKind::halves, PlacementKind::color};
+
+uint32_t coded_kind(const PatchPlacement& p) {
+  const auto& kinds = p.part == 0 ? kKinds : kPartKinds;
+  return static_cast<uint32_t>(std::find(std::begin(kinds), std::end(kinds), p.kind) - std::begin(kinds));
+}
+
+constexpr uint32_t kParts = 4;
 
 // Rules for a block's position: spelled out, or touching the block before on its right or its lower side.
 enum PositionRule : uint32_t { kSpelledOut = 0, kRightOf = 1, kBelow = 2 };
@@ -218,41 +224,73 @@ std::string read_colors(BitReader& in, uint32_t count, std::vector<PatchPlacemen
   return {};
 }
 
-}  // namespace
+// Patch and part as one number, which grows from placement to placement.
+uint64_t key_of(const PatchPlacement& p, bool has_parts) {
+  return has_parts ? uint64_t{kParts} * p.patch + p.part : p.patch;
+}
 
-void write_placements(BitWriter& out, std::span<const PatchPlacement> placements) {
+uint32_t count_of(std::span<const PatchPlacement> placements, PlacementKind kind) {
+  return static_cast<uint32_t>(
+      std::count_if(placements.begin(), placements.end(), [=](const auto& p) { return p.kind == kind; }));
+}
+
+// Which patches and parts, and of what kind.
+void write_keys(BitWriter& out, std::span<const PatchPlacement> placements, bool has_parts) {
   std::vector<uint32_t> gaps, kinds;
-  uint32_t next = 0;
+  uint64_t next = 0;
   for (const PatchPlacement& p : placements) {
-    gaps.push_back(p.patch - next);
-    kinds.push_back(coded_kind(p.kind));
-    next = p.patch + 1;
+    gaps.push_back(static_cast<uint32_t>(key_of(p, has_parts) - next));
+    kinds.push_back(coded_kind(p));
+    next = key_of(p, has_parts) + 1;
   }
   write_column(out, gaps);
   write_column(out, kinds);
-  write_blocks(out, placements);
-  write_colors(out, placements);
 }
 
-std::string read_placements(BitReader& in, uint32_t count, std::vector<PatchPlacement>& placements) {
+std::string read_keys(BitReader& in, uint32_t count, bool has_parts,
+                      std::vector<PatchPlacement>& placements) {
   const auto gaps = read_column(in, count);
   const auto kinds = read_column(in, count);
   if (!in.ok()) return {};
   placements.resize(count);
   uint64_t next = 0;
-  uint32_t blocks = 0, colors = 0;
   for (uint32_t i = 0; i < count; ++i) {
-    const uint64_t patch = next + gaps[i];
-    if (patch > UINT32_MAX || kinds[i] > 2)
-      return "placement " + std::to_string(i) + ": its patch does not fit in 32 bits, or its kind is unknown";
+    const uint64_t key = next + gaps[i];
+    const uint64_t patch = has_parts ? key / kParts : key;
+    if (key > UINT32_MAX || kinds[i] >= std::size(kKinds))
+      return "placement " + std::to_string(i) +
+             ": its patch and part do not fit in 32 bits, or its kind is unknown";
     placements[i].patch = static_cast<uint32_t>(patch);
-    placements[i].kind = kKinds[kinds[i]];
-    blocks += placements[i].kind == PlacementKind::block;
-    colors += placements[i].kind == PlacementKind::color;
-    next = patch + 1;
+    placements[i].part = has_parts ? static_cast<uint8_t>(key % kParts) : uint8_t{0};
+    placements[i].kind = placements[i].part == 0 ? kKinds[kinds[i]] : kPartKinds[kinds[i]];
+    next = key + 1;
   }
+  return {};
+}
+
+}  // namespace
+
+void write_placements(BitWriter& out, std::span<const PatchPlacement> placements) {
+  const bool has_parts =
+      std::any_of(placements.begin(), placements.end(), [](const auto& p) { return p.part != 0; });
+  out.put(has_parts, 1);
+  write_keys(out, placements, has_parts);
+  write_blocks(out, placements);
+  if (has_parts) write_triangle_placements(out, placements);
+  write_colors(out, placements);
+}
+
+std::string read_placements(BitReader& in, uint32_t count, std::vector<PatchPlacement>& placements) {
+  const bool has_parts = in.get(1) != 0;
+  if (std::string error = read_keys(in, count, has_parts, placements); !error.empty() || !in.ok())
+    return error;
+  const uint32_t blocks = count_of(placements, PlacementKind::block);
   if (std::string error = read_blocks(in, blocks, placements); !error.empty() || !in.ok()) return error;
-  return read_colors(in, colors, placements);
+  if (has_parts) {
+    if (std::string error = read_triangle_placements(in, placements); !error.empty() || !in.ok())
+      return error;
+  }
+  return read_colors(in, count_of(placements, PlacementKind::color), placements);
 }
 
 }  // namespace tessera::geometry_compression

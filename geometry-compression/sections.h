@@ -41,6 +41,10 @@ std::string read_vertices(BitReader& in, uint32_t count, std::span<const NewPatc
 void write_placements(BitWriter& out, std::span<const PatchPlacement> placements);
 std::string read_placements(BitReader& in, uint32_t count, std::vector<PatchPlacement>& placements);
 
+// The part of the placements that holds kinds l and halves.
+void write_triangle_placements(BitWriter& out, std::span<const PatchPlacement> placements);
+std::string read_triangle_placements(BitReader& in, std::span<PatchPlacement> placements);
+
 constexpr int kMaxCorners = 5;
 inline int corner_count(const NewPatch& patch) {
   return patch.triangles + 2;

@@ -2,35 +2,10 @@
 #include <array>
 #include <cmath>
 
+#include "base/triangle_angles.h"
 #include "pvs/visibility.h"
 
 namespace tessera::pvs {
-namespace {
-
-// Lengths near the ends of double's range would square out of it.
-dvec3 scaled_to_one(const dvec3& v) {
-  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-  return largest > 0 ? v / largest : v;
-}
-
-// Thesis eq. 3.1. acos of a dot product loses all digits for small angles; this does not. 0 where the eye is
-// at a corner.
-double angle_between(const dvec3& a, const dvec3& b) {
-  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
-}
-
-// Heron's formula as ordered by Kahan: exact to rounding for slivers too. 0 where no triangle has these
-// sides.
-double area_from_sides(double a, double b, double c) {
-  if (a < b) std::swap(a, b);
-  if (b < c) std::swap(b, c);
-  if (a < b) std::swap(a, b);
-  const double square = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c));
-  return square > 0 ? 0.25 * std::sqrt(square) : 0;
-}
-
-}  // namespace
-
 scene::Footprint footprint(const scene::Geometry& geometry, const scene::Patch& patch, const dmat4& transform,
                            const dvec3& eye, float pixels_per_radian) {
   double u_rad = 0, v_rad = 0, area_sr = 0;

@@ -88,6 +88,8 @@ StatusOr<atlas::LayoutKind> layout_kind(v1::SessionSettings& s) {
       return atlas::LayoutKind::blocks;
     case v1::LAYOUT_COHERENT:
       return atlas::LayoutKind::coherent;
+    case v1::LAYOUT_TESSELLATED:
+      return atlas::LayoutKind::tessellated;
     default:
       return absl::InvalidArgumentError(
           absl::StrCat("settings.layout: ", static_cast<int>(s.layout()), " is none that this server knows"));
@@ -164,7 +166,8 @@ StatusOr<SessionSettings> updated_settings(v1::SessionSettings& current, const v
         " texels; create a session with another one and move the client to it"));
   if (merged.layout() != current.layout())
     return absl::FailedPreconditionError(
-        "settings.layout: a session keeps its own; create a session with another one and move the client to it");
+        "settings.layout: a session keeps its own; create a session with another one and move the client to "
+        "it");
   if (merged.codec() != current.codec())
     return absl::FailedPreconditionError(
         absl::StrCat("settings.codec: a session keeps its ", v1::AtlasCodec_Name(current.codec()),

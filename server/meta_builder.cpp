@@ -1,6 +1,7 @@
 #include "server/meta_builder.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <utility>
@@ -41,22 +42,48 @@ bool differs(uint32_t a, uint32_t b, int threshold) {
   return false;
 }
 
+gc::HalvesPlacement to_wire(const atlas::HalvesPlace& halves) {
+  gc::HalvesPlacement out{.apex = halves.apex, .foot = halves.foot, .across = halves.across, .half = {}};
+  for (size_t i = 0; i < out.half.size(); ++i) {
+    const atlas::HalfPlace& half = halves.half[i];
+    out.half[i] = {half.x, half.y, half.along, half.turned};
+  }
+  return out;
+}
+
 gc::PatchPlacement to_wire(const atlas::Placement& p, uint32_t patch, uint32_t color) {
   gc::PatchPlacement out;
   out.patch = patch;
+  out.part = p.part;
   if (is_color(p)) {
     out.kind = gc::PlacementKind::color;
     out.rgb = color;
     return out;
   }
-  out.kind = gc::PlacementKind::block;
+  out.spacing = p.spacing;
+  if (p.kind == atlas::PlacementKind::halves) {
+    out.kind = gc::PlacementKind::halves;
+    out.halves = to_wire(p.halves);
+    return out;
+  }
   out.x = p.x;
   out.y = p.y;
+  if (p.kind == atlas::PlacementKind::l) {
+    out.kind = gc::PlacementKind::l;
+    out.l = {p.l.level, p.l.splits, p.l.turned, p.l.splits > 1 ? p.l.next_y : uint16_t{0}};
+    return out;
+  }
+  out.kind = gc::PlacementKind::block;
   out.width = p.width;
   out.height = p.height;
-  out.spacing = p.spacing;
   out.transposed = p.transposed;
   return out;
+}
+
+// Of a patch that is not shown, or not as colours.
+constexpr std::array<uint32_t, 3> kNoColors{kNone, kNone, kNone};
+size_t color_slot(const atlas::Placement& p) {
+  return p.part == atlas::kWholePatch ? 0 : p.triangle();
 }
 
 }  // namespace
@@ -77,7 +104,8 @@ struct MetaBuilder::Impl {
   std::vector<uint32_t> object_ids;            // by instance
   std::vector<gc::Transform> sent_transforms;  // by instance, of those that move
   std::vector<uint32_t> patch_ids;             // by PatchId
-  std::vector<uint32_t> sent_colors;           // by wire patch id; kNone = not shown as a colour
+  // By wire patch id, by triangle (of a whole patch: the first); kNone = not shown as a colour.
+  std::vector<std::array<uint32_t, 3>> sent_colors;
   uint32_t next_mesh = 0, next_vertex = 0, next_object = 0, next_patch = 0;
   bool first = true;
 
@@ -160,7 +188,7 @@ struct MetaBuilder::Impl {
     if (source.triangle_count >= 2) wire.vertices[3] = ensure_vertex(placed.geometry, corner[3], out);
     if (source.triangle_count == 3) wire.vertices[4] = ensure_vertex(placed.geometry, corner[7], out);
     out.patches.push_back(wire);
-    sent_colors.push_back(kNone);
+    sent_colors.push_back(kNoColors);
     return patch_ids[patch] = next_patch++;
   }
 
@@ -168,16 +196,19 @@ struct MetaBuilder::Impl {
                    gc::MetaFrame& out) {
     size_t at = 0, color = 0;  // in shown.placements, shown.colors
     for (const atlas::Placement& changed : delta.changed) {
-      for (; shown.placements[at].patch != changed.patch; ++at) color += is_color(shown.placements[at]);
+      const auto is_it = [&](const atlas::Placement& p) {
+        return p.patch == changed.patch && p.part == changed.part;
+      };
+      for (; !is_it(shown.placements[at]); ++at) color += is_color(shown.placements[at]);
       const uint32_t id = ensure_patch(changed.patch, transforms, out);
       const uint32_t rgb = is_color(changed) ? shown.colors[color] & kRgb : kNone;
       out.placements.push_back(to_wire(changed, id, rgb));
-      sent_colors[id] = rgb;
+      sent_colors[id][color_slot(changed)] = rgb;
     }
     for (const scene::PatchId removed : delta.removed) {
       const uint32_t id = patch_ids[removed];
       out.placements.push_back({.patch = id, .kind = gc::PlacementKind::none});
-      sent_colors[id] = kNone;
+      sent_colors[id] = kNoColors;
     }
   }
 
@@ -189,8 +220,9 @@ struct MetaBuilder::Impl {
       if (!is_color(placement)) continue;
       const uint32_t rgb = shown.colors[color++] & kRgb;
       const uint32_t id = patch_ids[placement.patch];
-      if (!differs(sent_colors[id], rgb, settings.color_threshold)) continue;
-      sent_colors[id] = rgb;
+      uint32_t& sent = sent_colors[id][color_slot(placement)];
+      if (!differs(sent, rgb, settings.color_threshold)) continue;
+      sent = rgb;
       out.placements.push_back(to_wire(placement, id, rgb));
     }
   }
@@ -223,8 +255,9 @@ gc::MetaFrame MetaBuilder::build(FrameNumber frame, const atlas::LayoutDelta& de
   impl_->add_moved(transforms, out);
   impl_->add_changed(delta, shown, transforms, out);
   impl_->add_recolored(shown, out);
-  std::sort(out.placements.begin(), out.placements.end(),
-            [](const auto& a, const auto& b) { return a.patch < b.patch; });
+  std::sort(out.placements.begin(), out.placements.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.patch, a.part) < std::pair(b.patch, b.part);
+  });
   return out;
 }
 

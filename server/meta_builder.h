@@ -22,7 +22,7 @@ struct MetaSettings {
 
 // What the atlas of a frame holds.
 struct Shown {
-  std::span<const atlas::Placement> placements;  // sorted by patch
+  std::span<const atlas::Placement> placements;  // sorted by patch and part
   std::span<const uint32_t>
       colors;  // 0xBBGGRR, one for each placement of kind color, in their order (shading::Gather)
 };

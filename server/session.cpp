@@ -30,10 +30,10 @@ class Stopwatch {
   TimeNs last_ = clock_.now();
 };
 
-// Where a placement's samples lie.
 void add_samples(const atlas::Placement& placement, codec::Occupancy& used) {
-  if (placement.kind == atlas::PlacementKind::block)
-    used.add_rectangle(placement.x, placement.y, placement.width, placement.height);
+  atlas::visit_samples(placement, used.width(), [&](const atlas::TexelRectangle& r) {
+    used.add_rectangle(r.x, r.y, r.width, r.height);
+  });
 }
 
 MetaSettings meta_settings(const SessionSettings& settings) {

@@ -132,6 +132,8 @@ Status Gather::Impl::upload(const GatherWork& work) {
   color_count = work.colors;
   stats = {.samples = work.compute_samples + work.raster_samples,
            .color_samples = work.colors,
+           .half_samples = work.half_samples,
+           .half_samples_outside = work.half_samples_outside,
            .raster_blocks = work.raster_blocks,
            .compute_blocks = work.compute_blocks};
   return absl::OkStatus();

@@ -21,13 +21,15 @@ struct GatherSettings {
 };
 
 struct GatherStats {
-  uint64_t samples = 0;        // shaded
-  uint64_t color_samples = 0;  // single colours among them
+  uint64_t samples = 0;               // shaded
+  uint64_t color_samples = 0;         // single colours among them
+  uint64_t half_samples = 0;          // of halves (Oversampling) among them
+  uint64_t half_samples_outside = 0;  // and of those, outside their triangles
   uint64_t raster_blocks = 0, compute_blocks = 0;
   double gpu_ms = 0;
 };
 
-// Per session. The atlas image is sRGB-encoded RGBA8 (alpha 255 in used texels); texels that no block uses
+// Per session. The atlas image is sRGB-encoded RGBA8 (alpha 255 in used texels); texels that nothing uses
 // keep the colour that they had (a still image costs a video coder nothing), mid-grey at first.
 class Gather {
  public:

@@ -1,5 +1,7 @@
 #include "shading/gather_work.h"
 
+#include "atlas/addressing/addressing.h"
+
 namespace tessera::shading {
 namespace {
 
@@ -9,31 +11,55 @@ struct Item {
   bool raster;
 };
 
-uint32_t shape_of(const atlas::Placement& p, uint32_t triangle_count) {
-  if (p.kind == atlas::PlacementKind::color) return triangle_count | kBlockColor;
-  return triangle_count | (p.transposed ? kBlockTransposed : 0) | (p.masked ? kBlockMasked : 0);
+using atlas::Placement;
+using atlas::PlacementKind;
+namespace addressing = atlas::addressing;
+
+uint32_t packed(uint32_t low, uint32_t high) {
+  return low | high << 16;
 }
 
-uint32_t size_of(const atlas::Placement& p) {
-  return p.kind == atlas::PlacementKind::color ? 1u | 1u << 16 : p.width | uint32_t{p.height} << 16;
-}
-
-uint32_t spacing_of(const atlas::Placement& p) {
+uint32_t spacing_of(const Placement& p) {
   uint32_t codes = 0;
   for (size_t i = 0; i < p.spacing.size(); ++i)
     codes |= uint32_t{static_cast<uint8_t>(p.spacing[i])} << (8 * i);
   return codes;
 }
 
-Status check(const atlas::Placement& p, uint32_t patch_count, const GatherLimits& limits) {
-  if (p.patch >= patch_count)
+addressing::ivec2 stairs_of(const BlockRecord& r) {
+  return addressing::half_staircase(static_cast<int>(r.size & 0xff), static_cast<int>(r.size >> 8 & 0x7ff));
+}
+
+uint64_t item_samples(const BlockRecord& r) {
+  if (r.shape & kBlockL)
+    return static_cast<uint64_t>(addressing::l_samples(static_cast<int>(r.size & 0x7f))) *
+           (r.shape & kBlockMasked ? 2 : 1);
+  if (r.shape & kBlockHalf) return static_cast<uint64_t>(addressing::staircase_samples(stairs_of(r)));
+  return uint64_t{r.size & 0xffff} * (r.size >> 16);
+}
+
+// Beyond the staircase's third side. Every row begins inside.
+uint64_t samples_outside(const addressing::ivec2& stairs) {
+  uint64_t outside = 0;
+  for (int y = 0; y <= stairs.y; ++y)
+    outside += static_cast<uint64_t>(addressing::staircase_row(y, stairs) -
+                                     (1 + stairs.x * (stairs.y - y) / stairs.y));
+  return outside;
+}
+
+Status check_rectangle(uint32_t x, uint32_t y, uint32_t width, uint32_t height, const GatherLimits& limits) {
+  if (width == 0 || height == 0 || x + width > limits.width || y + height > limits.height)
     return absl::InvalidArgumentError(
-        absl::StrFormat("gather: placement of patch %u, the scene has %u", p.patch, patch_count));
-  if (p.kind == atlas::PlacementKind::color) return absl::OkStatus();
-  if (p.width == 0 || p.height == 0 || p.x + p.width > limits.width || p.y + p.height > limits.height)
-    return absl::InvalidArgumentError(
-        absl::StrFormat("gather: block of %ux%u texels at (%u, %u) is empty or leaves the %ux%u atlas",
-                        p.width, p.height, p.x, p.y, limits.width, limits.height));
+        absl::StrFormat("gather: block of %ux%u texels at (%u, %u) is empty or leaves the %ux%u atlas", width,
+                        height, x, y, limits.width, limits.height));
+  return absl::OkStatus();
+}
+
+Status check_part(const Placement& p, uint32_t triangles) {
+  const bool needs_triangle = p.kind == PlacementKind::l || p.kind == PlacementKind::halves;
+  if (p.part > triangles || (needs_triangle && p.part == atlas::kWholePatch))
+    return absl::InvalidArgumentError(absl::StrFormat(
+        "gather: placement of part %d of patch %u, which has %u triangles", int{p.part}, p.patch, triangles));
   return absl::OkStatus();
 }
 
@@ -64,10 +90,6 @@ std::vector<uint32_t> order_by_material(std::span<const Item> items, size_t mate
   std::vector<uint32_t> order(items.size());
   for (uint32_t i = 0; i < items.size(); ++i) order[ends[items[i].material]++] = i;
   return order;
-}
-
-uint64_t item_samples(const BlockRecord& r) {
-  return uint64_t{r.size & 0xffff} * (r.size >> 16);
 }
 
 // Appends compute blocks and the start of every chunk; each material's samples fill whole chunks.
@@ -111,6 +133,95 @@ void add_raster(GatherWork& work, std::span<const Item> items, std::span<const u
   }
 }
 
+// The records of the placements, in their order.
+class Items {
+ public:
+  Items(const GatherLimits& limits, GatherWork& work) : limits_(limits), work_(work) {}
+
+  // `first`: what all records of `p` have in common, with its triangle count.
+  Status add(const Placement& p, BlockRecord first, uint32_t material) {
+    material_ = material;
+    first.spacing = spacing_of(p);
+    first.shape |= p.masked && p.kind != PlacementKind::color ? kBlockMasked : 0;
+    switch (p.kind) {
+      case PlacementKind::color:
+        first.place = work_.colors++;
+        first.size = packed(1, 1);
+        first.shape |= kBlockColor;
+        items_.push_back({first, material, false});
+        return absl::OkStatus();
+      case PlacementKind::block:
+        first.size = packed(p.width, p.height);
+        first.shape |= p.transposed ? kBlockTransposed : 0;
+        return add_one(first, p.x, p.y, p.width, p.height);
+      case PlacementKind::l:
+        return add_ls(p, first);
+      case PlacementKind::halves:
+        return add_halves(p, first);
+    }
+    return absl::InvalidArgumentError("gather: unknown kind of placement");
+  }
+  std::vector<Item>& items() { return items_; }
+
+ private:
+  Status add_ls(const Placement& p, BlockRecord record) {
+    const int level = p.l.level, splits = p.l.splits;
+    if (level < 1 || level > addressing::kMaxTessellationLevel || splits < 1 ||
+        splits > addressing::kMaxSplits ||
+        static_cast<uint32_t>(p.x + addressing::l_pair_pitch(level).x) > limits_.width)
+      return absl::InvalidArgumentError(
+          absl::StrFormat("gather: L of level %d, split in %d, at (%u, %u) of the %ux%u atlas", level, splits,
+                          p.x, p.y, limits_.width, limits_.height));
+    const addressing::ivec2 size = addressing::l_pair_size(level);
+    record.shape |= kBlockL;
+    const uint32_t shape = record.shape;
+    for (int i = 0; i < splits * splits; ++i) {
+      const int half = p.masked ? 2 * i : i + p.l.turned;  // of a pair
+      const addressing::ivec2 at =
+          addressing::l_pair_place(half / 2, {p.x, p.y}, p.l.next_y, level, static_cast<int>(limits_.width));
+      record.size = static_cast<uint32_t>(level | splits << 7 | i << 12);
+      record.shape = shape | (half % 2 == 1 ? kBlockTurned : 0);
+      TESSERA_RETURN_IF_ERROR(add_one(record, static_cast<uint32_t>(at.x), static_cast<uint32_t>(at.y),
+                                      static_cast<uint32_t>(size.x), static_cast<uint32_t>(size.y)));
+    }
+    return absl::OkStatus();
+  }
+
+  Status add_halves(const Placement& p, BlockRecord record) {
+    const uint32_t shape = record.shape | kBlockHalf;
+    const atlas::HalvesPlace& h = p.halves;
+    for (uint32_t half = 0; half < 2; ++half) {
+      const atlas::HalfPlace& place = h.half[half];
+      if (h.apex > 2 || h.foot > 63 || h.across < 1 || h.across > addressing::kMaxHalfWidth ||
+          place.along < 1 || place.along > addressing::kMaxHalfLength)
+        return absl::InvalidArgumentError(absl::StrFormat("gather: half of %dx%d intervals, apex %d, foot %d",
+                                                          int{h.across}, int{place.along}, int{h.apex},
+                                                          int{h.foot}));
+      const addressing::ivec2 stairs = addressing::half_staircase(h.across, place.along);
+      record.size = h.across | uint32_t{place.along} << 8 | uint32_t{h.foot} << 19 | uint32_t{h.apex} << 25 |
+                    half << 27;
+      record.shape = shape | (place.turned ? kBlockTurned : 0);
+      TESSERA_RETURN_IF_ERROR(add_one(record, place.x, place.y, static_cast<uint32_t>(stairs.y + 1),
+                                      static_cast<uint32_t>(stairs.x + 1)));
+      work_.half_samples += item_samples(record);
+      work_.half_samples_outside += samples_outside(stairs);
+    }
+    return absl::OkStatus();
+  }
+
+  Status add_one(BlockRecord record, uint32_t x, uint32_t y, uint32_t width, uint32_t height) {
+    TESSERA_RETURN_IF_ERROR(check_rectangle(x, y, width, height, limits_));
+    record.place = packed(x, y);
+    items_.push_back({record, material_, item_samples(record) >= limits_.raster_from_texels});
+    return absl::OkStatus();
+  }
+
+  const GatherLimits& limits_;
+  GatherWork& work_;
+  uint32_t material_ = 0;
+  std::vector<Item> items_;
+};
+
 }  // namespace
 
 StatusOr<GatherWork> build_gather_work(const scene::GpuScene& gpu_scene,
@@ -118,28 +229,26 @@ StatusOr<GatherWork> build_gather_work(const scene::GpuScene& gpu_scene,
                                        const GatherLimits& limits) {
   const scene::Scene& scene = gpu_scene.scene();
   GatherWork work;
-  std::vector<Item> items;
-  items.reserve(placements.size());
+  Items items(limits, work);
   InstanceFinder finder(scene);
-  for (const atlas::Placement& p : placements) {
-    TESSERA_RETURN_IF_ERROR(check(p, scene.patch_count, limits));
+  for (const Placement& p : placements) {
+    if (p.patch >= scene.patch_count)
+      return absl::InvalidArgumentError(
+          absl::StrFormat("gather: placement of patch %u, the scene has %u", p.patch, scene.patch_count));
     const uint32_t instance = finder.find(p.patch);
     const scene::Instance& owner = scene.instances[instance];
     const scene::Patch& patch = finder.geometry(instance).patches[p.patch - owner.first_patch];
-    const bool color = p.kind == atlas::PlacementKind::color;
-    items.push_back(
-        {.record = {.instance = instance,
-                    .first_triangle = gpu_scene.first_index(owner.geometry) / 3 + patch.first_triangle,
-                    .place = color ? work.colors++ : p.x | uint32_t{p.y} << 16,
-                    .size = size_of(p),
-                    .shape = shape_of(p, patch.triangle_count),
-                    .spacing = spacing_of(p)},
-         .material = owner.material,
-         .raster = !color && p.texels() >= limits.raster_from_texels});
+    TESSERA_RETURN_IF_ERROR(check_part(p, patch.triangle_count));
+    const bool whole = p.part == atlas::kWholePatch;
+    const uint32_t triangle = patch.first_triangle + (whole ? 0 : p.triangle());
+    const BlockRecord first{.instance = instance,
+                            .first_triangle = gpu_scene.first_index(owner.geometry) / 3 + triangle,
+                            .shape = whole ? patch.triangle_count : 1};
+    TESSERA_RETURN_IF_ERROR(items.add(p, first, owner.material));
   }
-  const std::vector<uint32_t> order = order_by_material(items, scene.materials.size());
-  add_compute(work, items, order);
-  add_raster(work, items, order);
+  const std::vector<uint32_t> order = order_by_material(items.items(), scene.materials.size());
+  add_compute(work, items.items(), order);
+  add_raster(work, items.items(), order);
   return work;
 }
 

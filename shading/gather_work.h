@@ -11,18 +11,22 @@
 
 namespace tessera::shading {
 
-// Block in shading/shaders/gather.glsl.
+// Block in shading/shaders/gather.glsl: a block, an L (or two, if masked), a half, or a single colour.
 struct BlockRecord {
   uint32_t instance;
-  uint32_t first_triangle;  // of the patch, in GpuScene::indices() / 3
-  uint32_t place;           // x | y << 16 in texels; or the slot of a single colour
-  uint32_t size;            // width | height << 16 in texels; 1 x 1 for a single colour
-  uint32_t shape;           // triangle count | flags
-  uint32_t spacing;         // codes of corners 1..4, least significant byte first (atlas::Placement)
-  uint32_t first_sample;    // compute path
+  uint32_t first_triangle;  // of the patch, or the one that it is for, in GpuScene::indices() / 3
+  uint32_t place;           // x | y << 16 in texels, of an L its pair's; or the slot of a single colour
+  // Block: width | height << 16 in texels; 1 x 1 for a single colour.
+  // L:     level (7) | splits (5) | number of the sub-triangle (10)
+  // Half:  across (8) | along (11) | foot (6) | apex (2) | which half (1)
+  uint32_t size;
+  uint32_t shape;         // triangle count, 1 of an L and a half | flags
+  uint32_t spacing;       // codes of corners 1..4, least significant byte first (atlas::Placement)
+  uint32_t first_sample;  // compute path
 };
 static_assert(sizeof(BlockRecord) == 28);
-constexpr uint32_t kBlockTransposed = 1u << 2, kBlockMasked = 1u << 3, kBlockColor = 1u << 4;
+constexpr uint32_t kBlockTransposed = 1u << 2, kBlockMasked = 1u << 3, kBlockColor = 1u << 4,
+                   kBlockL = 1u << 5, kBlockHalf = 1u << 6, kBlockTurned = 1u << 7;
 
 constexpr uint32_t kChunkSamples = 64;  // local size of gather.comp
 
@@ -40,7 +44,8 @@ struct GatherWork {
   std::vector<uint32_t> starts;  // by chunk of kChunkSamples samples of one material: its first block
   std::vector<ComputeBatch> compute_batches;
   std::vector<RasterBatch> raster_batches;
-  uint64_t compute_samples = 0, raster_samples = 0;  // shaded, without padding
+  uint64_t compute_samples = 0, raster_samples = 0;     // shaded, without padding
+  uint64_t half_samples = 0, half_samples_outside = 0;  // of halves; outside their triangles
   uint32_t colors = 0, compute_blocks = 0, raster_blocks = 0;
 };
 

@@ -11,9 +11,11 @@ using glm::clamp, glm::floor, glm::log2, glm::max, glm::min, glm::sqrt;
 using glm::ivec2, glm::ivec3, glm::vec2, glm::vec3;
 
 #include "atlas/addressing/block.glsl"
+#include "atlas/addressing/halves.glsl"
 #include "atlas/addressing/l_packing.glsl"
 #include "atlas/addressing/oversampling.glsl"
 #include "atlas/addressing/perspective.glsl"
+#include "atlas/addressing/split.glsl"
 #include "atlas/addressing/tessellation.glsl"
 #undef INLINE
 

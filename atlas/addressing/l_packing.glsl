@@ -86,21 +86,72 @@ INLINE vec2 l_position(vec3 lambda, int level) {
   return over_cut ? vec2(l - column, l - row) : l_place(tips, row, column, l);
 }
 
+// Texels of an L, and texel `index` of them, row by row.
+INLINE int l_samples(int level) {
+  int rows = l_full_rows(level);
+  return (level + 1) * rows + (level + 1 - rows) * l_full_columns(level);
+}
+
+INLINE ivec2 l_sample(int index, int level) {
+  int rows = l_full_rows(level);
+  int below = index - (level + 1) * rows;
+  if (below < 0) return ivec2(index % (level + 1), index / (level + 1));
+  return ivec2(below % l_full_columns(level), rows + below / l_full_columns(level));
+}
+
+// Which section of the L a texel lies in: the tip's square, and on which side of its diagonal.
+struct LSection {
+  int tip;
+  bool column_is_x;
+};
+
+// `texel` mirrored to the corner of its tip's square.
+INLINE ivec2 l_in_square(ivec2 texel, int tip, int level) {
+  return ivec2(tip == 2 ? level - texel.x : texel.x, tip == 1 ? level - texel.y : texel.y);
+}
+
+INLINE LSection l_section(ivec2 texel, int level) {
+  LSection section;
+  section.tip = 2 * texel.y > level ? 1 : 2 * texel.x > level ? 2 : 0;
+  ivec2 at = l_in_square(texel, section.tip, level);
+  section.column_is_x = at.x >= at.y;
+  return section;
+}
+
+// By corner, of a section's values for its largest, middle and least coordinate.
+INLINE vec3 l_by_corner(LSection section, float most, float middle, float least) {
+  bool x = section.column_is_x;
+  if (section.tip == 0) return x ? vec3(most, least, middle) : vec3(most, middle, least);
+  if (section.tip == 1) return x ? vec3(least, most, middle) : vec3(middle, most, least);
+  return x ? vec3(middle, least, most) : vec3(least, middle, most);
+}
+
 // The sample that a texel of the L shows; both texels of a sample on the cut give the same.
 INLINE vec3 l_barycentric(ivec2 texel, int level) {
-  int x = texel.x;
-  int y = texel.y;
-  int tip = 2 * y > level ? 1 : 2 * x > level ? 2 : 0;
-  if (tip == 1) y = level - y;
-  if (tip == 2) x = level - x;
+  LSection section = l_section(texel, level);
+  ivec2 at = l_in_square(texel, section.tip, level);
   float l = float(level);
-  float row = float(min(x, y));
+  float row = float(min(at.x, at.y));
   float least = 2.0f * row / (3.0f * l);
-  float middle = (float(max(x, y)) - row / 3.0f) / l;
-  float most = 1.0f - least - middle;
-  if (tip == 0) return x >= y ? vec3(most, least, middle) : vec3(most, middle, least);
-  if (tip == 1) return x <= y ? vec3(middle, most, least) : vec3(least, most, middle);
-  return y <= x ? vec3(middle, least, most) : vec3(least, middle, most);
+  float middle = (float(max(at.x, at.y)) - row / 3.0f) / l;
+  return l_by_corner(section, 1.0f - least - middle, middle, least);
+}
+
+// How l_barycentric() changes from texel to texel within the texel's section.
+struct LSteps {
+  vec3 ddx;
+  vec3 ddy;
+};
+
+INLINE LSteps l_steps(ivec2 texel, int level) {
+  LSection section = l_section(texel, level);
+  float step = 1.0f / float(level);
+  vec3 column = l_by_corner(section, -step, step, 0.0f);
+  vec3 row = l_by_corner(section, -step / 3.0f, -step / 3.0f, 2.0f * step / 3.0f);
+  LSteps steps;
+  steps.ddx = (section.column_is_x ? column : row) * (section.tip == 2 ? -1.0f : 1.0f);
+  steps.ddy = (section.column_is_x ? row : column) * (section.tip == 1 ? -1.0f : 1.0f);
+  return steps;
 }
 
 // Two Ls in one rectangle: one as it is, at the upper left, and one turned by 180 degrees. The rectangle is full at odd levels;

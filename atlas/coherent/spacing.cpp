@@ -1,24 +1,15 @@
 #include "atlas/coherent/spacing.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 
 namespace tessera::atlas::coherent {
 namespace {
 
-constexpr double kCodesPerOctave = 21;
-
 double distance_to(const scene::Geometry& geometry, uint32_t index, const dmat4& transform,
                    const dvec3& eye) {
   const dvec3 position(geometry.vertices[geometry.indices[index]].position);
   return glm::length(dvec3(transform * glm::dvec4(position, 1)) - eye);
-}
-
-SpacingCode code(double ratio) {
-  const double octaves = ratio > 0 ? std::log2(ratio) : -6.0;
-  if (!(octaves > -6)) return -126;  // NaN, too
-  return static_cast<SpacingCode>(std::lround(kCodesPerOctave * std::min(octaves, 6.0)));
 }
 
 }  // namespace
@@ -32,7 +23,7 @@ Spacing spacing_for(const scene::Geometry& geometry, const scene::Patch& patch, 
   // Corners 1..4 by index within the patch (scene::Patch).
   constexpr uint32_t kCorners[] = {1, 2, 3, 7};
   for (uint32_t c = 0; c < patch.triangle_count + 1; ++c)
-    spacing[c] = code(distance_to(geometry, first + kCorners[c], transform, eye) / reference);
+    spacing[c] = spacing_code(distance_to(geometry, first + kCorners[c], transform, eye) / reference);
   return spacing;
 }
 

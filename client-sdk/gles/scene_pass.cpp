@@ -24,7 +24,7 @@ StatusOr<ScenePass> ScenePass::create(ClipControl clip_control) {
   pass.clip_control_ = clip_control;
   TESSERA_ASSIGN_OR_RETURN(pass.program_,
                            make_program({kScenePrelude, atlas::addressing::kGlslText, kSceneVertex},
-                                        {kPicturePrelude, kSceneFragment}));
+                                        {kPicturePrelude, atlas::addressing::kGlslText, kSceneFragment}));
   set_sampler(pass.program_, "records", kRecords);
   set_sampler(pass.program_, "vertices", kVertices);
   set_sampler(pass.program_, "transforms", kTransforms);

@@ -17,13 +17,23 @@ uniform highp sampler2D vertices;
 uniform highp sampler2D transforms;
 uniform mat4 clip_from_relative;
 
-out vec3 spaced;                // texel within the block, and 1, times the corner's distance from the block's eye
+// Block: texel within it, and 1; L and halves: the corner's weights; times the corner's distance from the eye that it is for.
+out vec3 spaced;
+flat out int form;              // as below
+flat out uvec4 place;           // of an L and of halves: the record's shape
 flat out vec2 origin;           // of the block, in texels
 flat out vec2 last;             // centre of the last texel of the block's colour part, from the origin; of the first: 0.5
 flat out vec2 coverage_offset;  // from a texel to its coverage
 flat out vec4 single_color;     // a = 1: no block
 
+const int kFormBlock = 0, kFormL = 6, kFormHalves = 7;  // block or colour; else corner kinds (scene_state.h)
+
 ivec2 table_texel(int i) { return ivec2(i & 2047, i >> 11); }
+
+float distance_of(uvec4 shape, int corner) {
+  int code = int(shape.z << (24 - 8 * corner)) >> 24;
+  return ratio_from_code(code + kRatioCodeOne);
+}
 
 void set_block(uvec4 shape, uint what, int corner) {
   origin = vec2(uvec2(shape.x, shape.x >> 16) & 0xffffu);
@@ -36,8 +46,7 @@ void set_block(uvec4 shape, uint what, int corner) {
   vec2 extent = vec2(block_color_size(size, masked) - 1);
   last = extent + 0.5;
   // Interpolated on the surface, then divided: even on the screen of that eye (TSS eq. 5).
-  int code = int(shape.z << (24 - 8 * corner)) >> 24;
-  spaced = ratio_from_code(code + kRatioCodeOne) * vec3(block_corner_texel(position, extent) + 0.5, 1.0);
+  spaced = distance_of(shape, corner) * vec3(block_corner_texel(position, extent) + 0.5, 1.0);
   coverage_offset = masked ? vec2(block_coverage_offset(size)) : vec2(0.0);
 }
 
@@ -57,17 +66,27 @@ void main() {
                        dot(texelFetch(transforms, table_texel(3 * object + 2), 0), position));
   gl_Position = clip_from_relative * vec4(relative, 1.0);
 
+  int kind = int(what >> 24 & 7u);
+  form = kFormBlock;
+  place = shape;
   spaced = vec3(0.5, 0.5, 1.0);
   origin = vec2(0.0);
   last = vec2(0.5);
   coverage_offset = vec2(0.0);
   bool is_single = (what >> 30 & 1u) != 0u;
   single_color = vec4(vec3(uvec3(shape.x, shape.x >> 8, shape.x >> 16) & 0xffu) / 255.0, is_single ? 1.0 : 0.0);
-  if (!is_single) set_block(shape, what, corner);
+  if (is_single) return;
+  if (kind < kFormL) {
+    set_block(shape, what, corner);
+  } else {
+    form = kind;
+    spaced = vec3(corner == 0, corner == 1, corner == 2) * distance_of(shape, corner);
+  }
 }
 )";
 
-// After kPicturePrelude. Reads: the atlas. Writes: colour, and alpha that multisampling turns into coverage.
+// After kPicturePrelude and atlas::addressing::kGlslText. Reads: the atlas. Writes: colour, and alpha that
+// multisampling turns into coverage.
 constexpr const char* kSceneFragment = R"(
 uniform highp sampler2D atlas;
 uniform vec2 atlas_size;
@@ -75,6 +94,8 @@ uniform bool masked;
 uniform bool multisampled;
 
 in vec3 spaced;
+flat in int form;
+flat in uvec4 place;
 flat in vec2 origin;
 flat in vec2 last;
 flat in vec2 coverage_offset;
@@ -83,18 +104,71 @@ out vec4 color;
 
 vec3 atlas_at(vec2 position) { return textureLod(atlas, position / atlas_size, 0.0).rgb; }
 
+const int kFormL = 6, kFormHalves = 7;
+
+struct Places {
+  vec2 color;
+  vec2 coverage;
+};
+
+// At a pixel whose centre lies outside the triangle interpolation may leave the shape, and its divisor may even vanish. Not
+// `centroid`: thin triangles share most of their pixels, and each would be sampled elsewhere than where the pixel shows it.
+Places in_block() {
+  Places at;
+  at.color = origin + clamp(spaced.xy / max(spaced.z, 1e-6), vec2(0.5), last);
+  at.coverage = at.color + coverage_offset;
+  return at;
+}
+
+vec3 on_grid() {
+  vec3 inside = max(spaced, 0.0);
+  return inside / max(inside.x + inside.y + inside.z, 1e-6);
+}
+
+Places in_l() {
+  int level = int(place.x >> 24 & 63u) + 1;
+  ivec2 first = 2 * ivec2(uvec2(place.x, place.x >> 12) & 0xfffu);
+  bool split = place.x >> 31 != 0u;
+  SplitPoint point = split_point(on_grid(), split ? int(place.y & 0xffu) : 1);
+  // Number of the half pair.
+  int number = masked ? 2 * point.index : point.index + int(place.x >> 30 & 1u);
+  vec2 pair = vec2(l_pair_place(number / 2, first, 2 * int(place.y >> 8), level, int(atlas_size.x))) + 0.5;
+  vec2 position = l_position(point.lambda, level);
+  Places at;
+  at.color = pair + l_pair_position(position, number % 2 == 1, level);
+  at.coverage = pair + l_pair_position(position, true, level);
+  return at;
+}
+
+Places in_halves() {
+  vec3 grid = on_grid();
+  int apex = int(place.x >> 26 & 3u);
+  HalfPoint point = half_point(grid[(apex + 2) % 3], grid[apex], foot_from_code(int(place.y >> 26)));
+  uint half_place = point.half_number == 0 ? place.x : place.y;
+  int along = int(place.w >> (point.half_number == 0 ? 7 : 17) & 0x3ffu) + 1;
+  vec2 corner = vec2(half_place & 0x1fffu, 2u * (half_place >> 13 & 0xfffu)) + 0.5;
+  Places at;
+  at.color = corner + half_position(point, int(place.w & 0x7fu) + 1, along, (half_place >> 25 & 1u) != 0u);
+  at.coverage = at.color;
+  return at;
+}
+
 void main() {
-  // At a pixel whose centre lies outside the triangle interpolation may leave the block. Not `centroid`: thin triangles
-  // share most of their pixels, and each would be sampled elsewhere than where the pixel shows it.
-  // There the divisor may even vanish.
-  vec2 inside = origin + clamp(spaced.xy / max(spaced.z, 1e-6), vec2(0.5), last);
-  color = vec4(for_target(single_color.a > 0.5 ? single_color.rgb : atlas_at(inside)), 1.0);
+  Places at;
+  if (form == kFormL) {
+    at = in_l();
+  } else if (form == kFormHalves) {
+    at = in_halves();
+  } else {
+    at = in_block();
+  }
+  color = vec4(for_target(single_color.a > 0.5 ? single_color.rgb : atlas_at(at.color)), 1.0);
   if (!masked) return;
   // Coverage travels as grey, 0.5 = the material's cut-off. Its luma is free of chroma's rounding.
-  float coverage = dot(atlas_at(inside + coverage_offset), vec3(0.2126, 0.7152, 0.0722));
+  float coverage = dot(atlas_at(at.coverage), vec3(0.2126, 0.7152, 0.0722));
   // The edge one pixel wide, whatever the texels' size.
   float alpha = clamp((coverage - 0.5) / max(fwidth(coverage), 1e-3) + 0.5, 0.0, 1.0);
-  if (single_color.a > 0.5) alpha = 1.0;
+  if (single_color.a > 0.5 || form == kFormHalves) alpha = 1.0;
   if (alpha < (multisampled ? 1e-3 : 0.5)) discard;
   color.a = alpha;
 }

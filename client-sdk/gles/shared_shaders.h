@@ -16,6 +16,7 @@ void main() {
 // by itself needs them linear.
 constexpr const char* kPicturePrelude = R"(#version 300 es
 precision highp float;
+precision highp int;
 uniform bool srgb_target;
 vec3 for_target(vec3 encoded) {
   if (!srgb_target) return encoded;

@@ -17,12 +17,11 @@ void main() {
   while (s >= blocks[b + 1u].first_sample) ++b;  // the last block is followed by one that never starts
   Block block = blocks[b];
   uint i = s - block.first_sample;
-  uvec2 size = block_size(block);
-  if (i >= size.x * size.y) return;  // padding between materials
-  uvec2 texel = uvec2(i % size.x, i / size.x);
+  if (i >= block_samples(block)) return;  // padding between materials
+  ivec2 texel = block_sample(block, i);
   vec4 color = vec4(srgb_encode_color(block_texel(block, texel)), 1.0);
   if ((block.shape & kBlockColor) != 0u)
     colors[block.place] = packUnorm4x8(vec4(color.rgb, 0.0));
   else
-    imageStore(atlas, ivec2(uvec2(block.place & 0xffffu, block.place >> 16) + texel), color);
+    imageStore(atlas, ivec2(block.place & 0xffffu, block.place >> 16) + texel, color);
 }

@@ -8,6 +8,7 @@ layout(location = 0) out vec4 out_color;
 
 void main() {
   Block block = blocks[in_block];
-  uvec2 texel = uvec2(gl_FragCoord.xy) - uvec2(block.place & 0xffffu, block.place >> 16);
+  ivec2 texel = ivec2(gl_FragCoord.xy) - ivec2(block.place & 0xffffu, block.place >> 16);
+  if (!block_has(block, texel)) discard;
   out_color = vec4(block_texel(block, texel), 1.0);
 }

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// A block as a rectangle of two triangles; first_instance is the first of a material's blocks.
+// A block's rectangle as two triangles; first_instance is the first of a material's blocks.
 #include "shading/shaders/gather.glsl"
 
 layout(location = 0) flat out uint out_block;
@@ -9,7 +9,7 @@ void main() {
   const uint kCorners[6] = uint[](0u, 1u, 2u, 2u, 1u, 3u);
   uint corner = kCorners[gl_VertexIndex];
   Block block = blocks[gl_InstanceIndex];
-  uvec2 size = block_size(block);
+  uvec2 size = block_rectangle(block);
   uvec2 texel = uvec2(block.place & 0xffffu, block.place >> 16) + uvec2(corner & 1u, corner >> 1) * size;
   vec2 unit = vec2(texel) / vec2(pass.atlas_size);
   out_block = uint(gl_InstanceIndex);

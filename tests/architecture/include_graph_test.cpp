@@ -29,7 +29,7 @@ TEST_F(SourceTree, WasRead) {
   EXPECT_TRUE(rules_.at("bench").contains("server"));
   ASSERT_TRUE(graph_.contains("atlas/placement.h"));
   EXPECT_THAT(graph_.at("atlas/placement.h"),
-              ElementsAre("array", "cstdint", "span", "vector", "scene/scene.h"));
+              ElementsAre("array", "cstdint", "functional", "span", "vector", "scene/scene.h"));
 }
 
 TEST_F(SourceTree, RoomsUseOnlyTheRoomsThatTheyMay) {

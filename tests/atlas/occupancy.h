@@ -29,6 +29,7 @@ class Occupancy {
     return true;
   }
   uint64_t texels() const { return texels_; }
+  const std::vector<uint8_t>& taken() const { return taken_; }  // row by row
 
  private:
   uint32_t width_, height_;

@@ -66,6 +66,32 @@ TEST_F(Fixture, EveryDifferenceIsSeen) {
   }
 }
 
+TEST_F(Fixture, TrianglesArePlacedOneByOne) {
+  client::TriangleFields l, halves;
+  l.corner_kind = client::kCornerL;
+  l.x = 6;
+  l.l = {5, 2, true, 40};
+  halves.corner_kind = client::kCornerHalves;
+  halves.halves = {1, 9, 3, {{{5, 8, 20, false}, {30, 8, 11, true}}}};
+  state.records[0] = {client::pack(l)};
+  state.records[1] = {client::pack(halves)};
+  atlas::Placement first{.patch = 1, .part = atlas::part_of(0), .kind = atlas::PlacementKind::l, .x = 6};
+  first.l = {5, 2, true, 40};
+  atlas::Placement second{.patch = 1, .part = atlas::part_of(1), .kind = atlas::PlacementKind::halves};
+  second.halves = {1, 9, 3, {{{5, 8, 20, false}, {30, 8, 11, true}}}};
+  const std::vector<atlas::Placement> both{first, second};
+  EXPECT_TRUE(matches(state, both, scene));
+  for (int what = 0; what < 5; ++what) {
+    std::vector<atlas::Placement> other = both;
+    if (what == 0) other[0].l.level = 6;
+    if (what == 1) other[0].l.turned = false;
+    if (what == 2) other[0].l.next_y = 42;
+    if (what == 3) other[1].halves.foot = 8;
+    if (what == 4) other[1].halves.half[1].x = 31;
+    EXPECT_FALSE(matches(state, other, scene)) << what;
+  }
+}
+
 TEST_F(Fixture, AMissingTriangleIsSeen) {
   state.records[1].clear();
   EXPECT_FALSE(matches(state, placements, scene));

@@ -46,6 +46,21 @@ inline PatchPlacement in_block(uint32_t patch, uint16_t x, uint16_t y, uint16_t 
   return {.patch = patch, .kind = PlacementKind::block, .x = x, .y = y, .width = width, .height = height};
 }
 
+inline PatchPlacement in_l(uint32_t patch, uint8_t part, uint16_t x, uint16_t y, uint8_t level,
+                           uint8_t splits = 1) {
+  PatchPlacement p{.patch = patch, .part = part, .kind = PlacementKind::l, .x = x, .y = y};
+  p.l = {level, splits, false, 0};
+  return p;
+}
+
+// Both halves at one place.
+inline PatchPlacement in_halves(uint32_t patch, uint8_t part, uint8_t apex, uint8_t across, uint16_t along,
+                                uint16_t x, uint16_t y) {
+  PatchPlacement p{.patch = patch, .part = part, .kind = PlacementKind::halves};
+  p.halves = {apex, 30, across, {{{x, y, along, false}, {x, y, along, true}}}};
+  return p;
+}
+
 inline PatchPlacement gone(uint32_t patch) {
   return {.patch = patch};
 }

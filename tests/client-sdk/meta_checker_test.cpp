@@ -117,7 +117,7 @@ const HostileCase kHostile[] = {
     {"placements.patch of entry 0 is 1", [](MetaFrame& f) { f.placements.push_back(in_color(1, 0)); }},
     {"placements.rgb", [](MetaFrame& f) { f.placements.push_back(in_color(0, 0x1000000)); }},
     {"placements.kind",
-     [](MetaFrame& f) { f.placements.push_back({.kind = static_cast<PlacementKind>(3)}); }},
+     [](MetaFrame& f) { f.placements.push_back({.kind = static_cast<PlacementKind>(5)}); }},
     {"placements.width", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 0, 0, 2)); }},
     {"placements.width", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 0, 3, 2)); }},
     {"placements.width", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 0, 2, 258)); }},
@@ -130,8 +130,63 @@ const HostileCase kHostile[] = {
     {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 16, 0, 2, 2)); }},
     {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 14, 4, 4)); }},
     {"placements.x, y", [](MetaFrame& f) { f.placements.push_back(in_block(0, 0, 65534, 2, 2)); }},
+    {"placements.part",
+     [](MetaFrame& f) {
+       f.placements.push_back(in_block(0, 0, 0, 2, 2));
+       f.placements.back().part = 1;
+     }},
+    {"placements.part", [](MetaFrame& f) { f.placements.push_back(in_l(0, 3, 0, 0, 2)); }},
+    {"placements.part", [](MetaFrame& f) { f.placements.push_back(in_l(0, 0, 0, 0, 2)); }},
+    {"placements.l of entry 0 has level 0",
+     [](MetaFrame& f) { f.placements.push_back(in_l(0, 1, 0, 0, 0)); }},
+    {"placements.l of entry 0 has level 65",
+     [](MetaFrame& f) { f.placements.push_back(in_l(0, 1, 0, 0, 65)); }},
+    {"splits 0", [](MetaFrame& f) { f.placements.push_back(in_l(0, 1, 0, 0, 2, 0)); }},
+    {"splits 32", [](MetaFrame& f) { f.placements.push_back(in_l(0, 1, 0, 0, 1, 32)); }},
+    {"placements.l of entry 0 lies at", [](MetaFrame& f) { f.placements.push_back(in_l(0, 1, 1, 0, 2)); }},
+    {"placements.l of entry 0 lies at",
+     [](MetaFrame& f) {
+       f.objects.push_back({.masked = true});
+       f.patches.push_back({.object = 1, .vertices = {0, 1, 2}});
+       f.placements.push_back(in_l(1, 1, 0, 0, 2));
+       f.placements.back().l.turned = true;
+     }},
+    {"must lie inside", [](MetaFrame& f) { f.placements.push_back(in_l(0, 1, 12, 0, 2)); }},
+    {"must lie inside", [](MetaFrame& f) { f.placements.push_back(in_l(0, 1, 0, 14, 2)); }},
+    {"must lie inside", [](MetaFrame& f) { f.placements.push_back(in_l(0, 1, 0, 0, 30)); }},
+    {"must lie inside",  // the last pair would be in the third row
+     [](MetaFrame& f) {
+       f.placements.push_back(in_l(0, 1, 8, 0, 2, 3));
+       f.placements.back().l.next_y = 10;
+     }},
+    {"placements.halves of entry 0 has apex 3",
+     [](MetaFrame& f) { f.placements.push_back(in_halves(0, 1, 3, 5, 5, 0, 0)); }},
+    {"across 0", [](MetaFrame& f) { f.placements.push_back(in_halves(0, 1, 0, 0, 5, 0, 0)); }},
+    {"across 129", [](MetaFrame& f) { f.placements.push_back(in_halves(0, 1, 0, 129, 5, 0, 0)); }},
+    {"placements.halves.along", [](MetaFrame& f) { f.placements.push_back(in_halves(0, 1, 0, 2, 0, 0, 0)); }},
+    {"placements.halves.along",
+     [](MetaFrame& f) { f.placements.push_back(in_halves(0, 1, 0, 2, 1025, 0, 0)); }},
+    {"placements.halves of entry 0 at",
+     [](MetaFrame& f) { f.placements.push_back(in_halves(0, 1, 0, 2, 5, 11, 0)); }},
+    {"placements.halves of entry 0 at",
+     [](MetaFrame& f) { f.placements.push_back(in_halves(0, 1, 0, 2, 5, 0, 14)); }},
+    {"placements.halves of entry 0 at",
+     [](MetaFrame& f) { f.placements.push_back(in_halves(0, 1, 0, 2, 5, 0, 1)); }},
 };
 INSTANTIATE_TEST_SUITE_P(MetaChecker, Hostile, ::testing::ValuesIn(kHostile));
+
+TEST(MetaChecker, AcceptsTrianglesUpToTheEdgeOfTheAtlas) {
+  MetaChecker checker;
+  MetaFrame frame = first_frame(1);
+  frame.placements = {in_l(0, 1, 10, 12, 2), in_halves(0, 2, 2, 2, 5, 10, 12)};
+  EXPECT_EQ(checker.check(frame), absl::OkStatus());
+  frame = next_frame(2);
+  frame.placements = {in_l(0, 1, 8, 0, 2, 2),
+                      in_color(0, 5)};  // four Ls: two pairs, the second in the next row
+  frame.placements[0].l.next_y = 12;
+  frame.placements[1].part = 2;
+  EXPECT_EQ(checker.check(frame), absl::OkStatus());
+}
 
 TEST(MetaChecker, AtlasSizeChangesOnlyWithAFullState) {
   MetaChecker checker;

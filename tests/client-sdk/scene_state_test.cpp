@@ -18,6 +18,37 @@ TEST(TriangleRecord, EveryBlockPositionSizeAndSpacingSurvivesPacking) {
   }
 }
 
+TEST(TriangleRecord, LsAndHalvesSurvivePacking) {
+  std::mt19937 random(2);
+  for (int i = 0; i < 20000; ++i) {
+    TriangleFields f;
+    f.object = random() >> 8;
+    f.masked = random() & 1;
+    for (size_t c = 1; c < 3; ++c) f.spacing[c] = static_cast<int8_t>(random());
+    if (i % 2 == 0) {
+      f.corner_kind = kCornerL;
+      f.x = static_cast<uint16_t>(random() % 4096 * 2);
+      f.y = static_cast<uint16_t>(random() % 4096 * 2);
+      f.l = {static_cast<uint8_t>(1 + random() % 64), static_cast<uint8_t>(1 + random() % 31),
+             random() % 2 == 0, 0};
+      if (f.l.splits > 1) f.l.next_y = static_cast<uint16_t>(random() % 4096 * 2);
+    } else {
+      f.corner_kind = kCornerHalves;
+      f.halves = {static_cast<uint8_t>(random() % 3),
+                  static_cast<uint8_t>(random() % 64),
+                  static_cast<uint8_t>(1 + random() % 128),
+                  {}};
+      for (auto& half : f.halves.half)
+        half = {static_cast<uint16_t>(random() % 8192), static_cast<uint16_t>(random() % 4096 * 2),
+                static_cast<uint16_t>(1 + random() % 1024), random() % 2 == 0};
+    }
+    ASSERT_EQ(unpack(pack(f)), f) << i;
+    if (i % 2 == 0 && f.l.splits == 1) {
+      ASSERT_EQ(pack(f).shape[1], 0u) << "the place of an L fits in 4 bytes";
+    }
+  }
+}
+
 TEST(TriangleRecord, FieldsDoNotDisturbEachOther) {
   std::mt19937 random(1);
   for (int i = 0; i < 20000; ++i) {

@@ -91,11 +91,10 @@ class NaiveModel {
 
   void apply(const MetaFrame& frame) {
     for (const auto& p : frame.placements) {
-      if (p.kind == PlacementKind::none) {
-        placed_.erase(p.patch);
-      } else {
-        placed_[p.patch] = p;
-      }
+      // What is for a whole patch takes the place of all that its triangles had.
+      if (p.part == 0)
+        std::erase_if(placed_, [&](const auto& entry) { return entry.first.first == p.patch; });
+      if (p.kind != PlacementKind::none) placed_[{p.patch, p.part}] = p;
     }
   }
 
@@ -105,7 +104,7 @@ class NaiveModel {
     MetaFrame all = first_frame(1, 0);
     all.objects = objects_;
     all.patches = patches_;
-    for (const auto& [id, placement] : placed_) all.placements.push_back(placement);
+    for (const auto& [key, placement] : placed_) all.placements.push_back(placement);
     store.apply(all);
     return store.state().records;
   }
@@ -113,7 +112,7 @@ class NaiveModel {
  private:
   std::vector<geometry_compression::NewPatch> patches_;
   std::vector<geometry_compression::NewObject> objects_;
-  std::map<uint32_t, PatchPlacement> placed_;
+  std::map<std::pair<uint32_t, uint8_t>, PatchPlacement> placed_;
 };
 
 std::vector<std::pair<std::array<uint32_t, 4>, std::array<uint32_t, 4>>> sorted(
@@ -124,8 +123,15 @@ std::vector<std::pair<std::array<uint32_t, 4>, std::array<uint32_t, 4>>> sorted(
   return out;
 }
 
-PatchPlacement random_placement(uint32_t patch, std::mt19937& random) {
-  switch (random() % 3) {
+PatchPlacement random_placement(uint32_t patch, uint32_t triangles, std::mt19937& random) {
+  const auto part = static_cast<uint8_t>(1 + random() % triangles);
+  switch (random() % 5) {
+    case 3:
+      return in_l(patch, part, static_cast<uint16_t>(patch % 64 * 2), 4,
+                  static_cast<uint8_t>(1 + patch % 64));
+    case 4:
+      return in_halves(patch, part, static_cast<uint8_t>(patch % 3), 5, static_cast<uint16_t>(1 + patch), 0,
+                       2);
     case 0:
       return gone(patch);
     case 1:
@@ -154,7 +160,7 @@ TEST(SceneStore, RandomChangesLeaveExactlyWhatANaiveModelHolds) {
     MetaFrame meta = next_frame(frame);
     const uint32_t stride = 1 + random() % 40;
     for (uint32_t p = random() % stride; p < kPatches; p += stride)
-      meta.placements.push_back(random_placement(p, random));
+      meta.placements.push_back(random_placement(p, first.patches[p].triangles, random));
     store.apply(meta);
     model.apply(meta);
     const auto expected = model.records();

@@ -56,10 +56,18 @@ TEST(MetaCodec, ExtremesOfEveryField) {
     for (int i = 0; i < triangles + 2; ++i) p.vertices[i] = i % 2 ? UINT32_MAX : 0;
     f.patches.push_back(p);
   }
-  f.placements = {{0, PlacementKind::block, 8190, 8190, 256, 2, true, {126, -126, 126, -126}},
-                  {1, PlacementKind::block, 0, 0, 2, 254, false, {-126, -126, 126, 126}},
-                  {UINT32_MAX - 1, PlacementKind::color, 0, 0, 0, 0, false, {}, 0xffffff},
-                  {UINT32_MAX, PlacementKind::none}};
+  f.placements = {{0, 0, PlacementKind::block, 8190, 8190, 256, 2, true, {126, -126, 126, -126}},
+                  {1, 0, PlacementKind::block, 0, 0, 2, 254, false, {-126, -126, 126, 126}},
+                  {.patch = UINT32_MAX - 1, .kind = PlacementKind::color, .rgb = 0xffffff},
+                  {.patch = UINT32_MAX, .kind = PlacementKind::none}};
+  expect_round_trip(f);
+  constexpr uint32_t kLast = (1u << 30) - 1;
+  PatchPlacement l{.patch = 0, .part = 1, .kind = PlacementKind::l, .x = 8190, .y = 8190};
+  l.spacing = {126, -126};
+  l.l = {64, 31, true, 8190};
+  PatchPlacement halves{.patch = kLast, .part = 2, .kind = PlacementKind::halves};
+  halves.halves = {2, 63, 128, {{{8191, 8190, 1024, true}, {0, 0, 1, false}}}};
+  f.placements = {l, halves, {.patch = kLast, .part = 3, .kind = PlacementKind::color, .rgb = 0xffffff}};
   expect_round_trip(f);
 }
 
@@ -114,8 +122,8 @@ TEST(MetaCodec, TestVectorOfTheSpecification) {
   object.transform.translation = {0, 4, 0};
   f.objects = {object};
   f.patches = {{0, 2, {0, 1, 2, 3}}, {0, 1, {2, 3, 0}}};
-  f.placements = {{0, PlacementKind::block, 32, 16, 16, 8, false},
-                  {1, PlacementKind::color, 0, 0, 0, 0, false, {}, 0x0a141e}};
+  f.placements = {{.patch = 0, .kind = PlacementKind::block, .x = 32, .y = 16, .width = 16, .height = 8},
+                  {.patch = 1, .kind = PlacementKind::color, .rgb = 0x0a141e}};
   const auto bytes = encode(f);
   std::string hex;
   for (uint8_t b : bytes) {
@@ -125,7 +133,7 @@ TEST(MetaCodec, TestVectorOfTheSpecification) {
   EXPECT_EQ(
       hex,
       "54534d4602000000070000520808000400c18302144850001ff80000000000001000000000000000080100000000000003fe00"
-      "000000000005ff900400000000000020a887f82404a0afc05019819f03032c1105c45fff05e1f07ffc0c0cdf08e06e00");
+      "000000000005ff900400000000000020a887f82404a0afc05019819f03032c1105c45fef82f0f83ffe06066f84703700");
   expect_round_trip(f);
 }
 

@@ -146,12 +146,45 @@ TEST(MetaHostile, ValuesOutsideTheirRangeAreErrors) {
     EXPECT_TRUE(refuses(f));
   }
   f = {};
-  f.placements = {{0, PlacementKind::block, 8192, 0, 1, 1, false, 0}};
-  EXPECT_TRUE(refuses(f));
-  f.placements = {{0, PlacementKind::block, 0, 0, 9, 1, false, 0}};
-  EXPECT_TRUE(refuses(f));
-  f.placements = {{0, PlacementKind::block, 0, 0, 1, 0, false, 0}};
-  EXPECT_TRUE(refuses(f));
+  const auto refuses_block = [&](uint16_t x, uint16_t width, uint16_t height) {
+    f.placements = {{.kind = PlacementKind::block, .x = x, .width = width, .height = height}};
+    return refuses(f);
+  };
+  EXPECT_FALSE(refuses_block(8190, 2, 2));
+  EXPECT_TRUE(refuses_block(8192, 2, 2));
+  EXPECT_TRUE(refuses_block(0, 9, 1));
+  EXPECT_TRUE(refuses_block(0, 1, 0));
+}
+
+TEST(MetaHostile, LsAndHalvesOutOfTheirRangesAreErrors) {
+  const auto refuses_l = [](uint16_t x, LPlacement l, int8_t spacing = 0) {
+    MetaFrame f, out;
+    f.placements = {{.part = 1, .kind = PlacementKind::l, .x = x, .spacing = {spacing}, .l = l}};
+    return !decode(encode(f), out).empty();
+  };
+  EXPECT_FALSE(refuses_l(8190, {64, 31, true, 8190}, -126));
+  EXPECT_TRUE(refuses_l(8192, {64, 1, true, 0}));
+  EXPECT_TRUE(refuses_l(0, {0, 1, false, 0}));
+  EXPECT_TRUE(refuses_l(0, {65, 1, false, 0}));
+  EXPECT_TRUE(refuses_l(0, {3, 0, false, 0}));
+  EXPECT_TRUE(refuses_l(0, {3, 32, false, 0}));
+  EXPECT_TRUE(refuses_l(0, {3, 2, false, 8192}));
+  EXPECT_TRUE(refuses_l(0, {3, 1, false, 0}, 127));
+
+  const auto refuses_halves = [](HalvesPlacement halves) {
+    MetaFrame f, out;
+    f.placements = {{.part = 3, .kind = PlacementKind::halves, .halves = halves}};
+    return !decode(encode(f), out).empty();
+  };
+  EXPECT_FALSE(refuses_halves({2, 63, 128, {{{8191, 8190, 1024, true}, {0, 0, 1, true}}}}));
+  EXPECT_TRUE(refuses_halves({3, 0, 1, {{{0, 0, 1, false}, {0, 0, 1, true}}}}));
+  EXPECT_TRUE(refuses_halves({0, 64, 1, {{{0, 0, 1, false}, {0, 0, 1, true}}}}));
+  EXPECT_TRUE(refuses_halves({0, 0, 0, {{{0, 0, 1, false}, {0, 0, 1, true}}}}));
+  EXPECT_TRUE(refuses_halves({0, 0, 129, {{{0, 0, 1, false}, {0, 0, 1, true}}}}));
+  EXPECT_TRUE(refuses_halves({0, 0, 1, {{{0, 0, 0, false}, {0, 0, 1, true}}}}));
+  EXPECT_TRUE(refuses_halves({0, 0, 1, {{{0, 0, 1, false}, {0, 0, 1025, true}}}}));
+  EXPECT_TRUE(refuses_halves({0, 0, 1, {{{8192, 0, 1, false}, {0, 0, 1, true}}}}));
+  EXPECT_TRUE(refuses_halves({0, 0, 1, {{{0, 0, 1, false}, {0, 8192, 1, true}}}}));
 }
 
 }  // namespace

@@ -51,6 +51,36 @@ PatchPlacement any_placement(Random& random) {
   return p;
 }
 
+// Of a triangle.
+PatchPlacement any_part_placement(Random& random) {
+  constexpr PlacementKind kKinds[] = {PlacementKind::color, PlacementKind::l, PlacementKind::halves};
+  PatchPlacement p;
+  p.kind = kKinds[below(random, 3)];
+  const auto position = [&] { return static_cast<uint16_t>(2 * below(random, 4096)); };
+  if (p.kind == PlacementKind::color) {
+    p.rgb = static_cast<uint32_t>(random() & 0xffffff);
+    return p;
+  }
+  for (size_t i = 0; i < 2; ++i)
+    p.spacing[i] = static_cast<int8_t>(static_cast<int>(below(random, 253)) - 126);
+  if (p.kind == PlacementKind::l) {
+    p.x = position();
+    p.y = position();
+    p.l.level = static_cast<uint8_t>(1 + below(random, 64));
+    p.l.splits = static_cast<uint8_t>(below(random, 3) ? 1 : 2 + below(random, 30));
+    p.l.turned = below(random, 2) != 0;
+    p.l.next_y = p.l.splits > 1 ? position() : uint16_t{0};
+    return p;
+  }
+  p.halves.apex = static_cast<uint8_t>(below(random, 3));
+  p.halves.foot = static_cast<uint8_t>(below(random, 64));
+  p.halves.across = static_cast<uint8_t>(1 + below(random, 128));
+  for (HalfPlacement& half : p.halves.half)
+    half = {static_cast<uint16_t>(below(random, 8192)), position(),
+            static_cast<uint16_t>(1 + below(random, 1024)), below(random, 2) != 0};
+  return p;
+}
+
 std::vector<uint32_t> sorted_ids(Random& random, uint32_t count) {
   std::vector<uint32_t> ids(count);
   for (uint32_t& id : ids) id = any_u32(random);
@@ -92,9 +122,12 @@ MetaFrame random_frame(Random& random, uint32_t max_items) {
   for (uint32_t id : sorted_ids(random, count())) f.moved.push_back({id, any_transform(random)});
   for (uint32_t n = count(); n > 0; --n)
     f.patches.push_back(any_patch(random, f.patches.empty() ? NewPatch{} : f.patches.back()));
+  const bool has_parts = below(random, 3) == 0;
   for (uint32_t id : sorted_ids(random, count())) {
-    f.placements.push_back(any_placement(random));
-    f.placements.back().patch = id;
+    const uint32_t part = has_parts ? id % 4 : 0;
+    f.placements.push_back(part ? any_part_placement(random) : any_placement(random));
+    f.placements.back().patch = has_parts ? id / 4 : id;
+    f.placements.back().part = static_cast<uint8_t>(part);
   }
   return f;
 }

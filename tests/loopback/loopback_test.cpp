@@ -47,7 +47,8 @@ TEST(Loopback, TheClientShowsWhatTheServerMeant) {
 }
 
 TEST(Loopback, EveryLayoutShowsTheScene) {
-  for (const atlas::LayoutKind layout : {atlas::LayoutKind::blocks, atlas::LayoutKind::coherent}) {
+  for (const atlas::LayoutKind layout :
+       {atlas::LayoutKind::blocks, atlas::LayoutKind::coherent, atlas::LayoutKind::tessellated}) {
     LoopbackSettings s = small(0.2);
     s.layout = layout;
     const LoopbackResult result = run(s);

@@ -78,6 +78,35 @@ TEST_F(Fixture, SendsThingsOnceAndSharesVertices) {
   EXPECT_EQ(second.placements[0].x, 32);
 }
 
+TEST_F(Fixture, TrianglesArePlacedAndColouredOneByOne) {
+  atlas::Placement l{.patch = 0, .part = atlas::part_of(0), .kind = atlas::PlacementKind::l, .x = 6, .y = 8};
+  l.l = {.level = 9, .splits = 2, .turned = true, .next_y = 20};
+  atlas::Placement halves{.patch = 1, .part = atlas::part_of(0), .kind = atlas::PlacementKind::halves};
+  halves.halves = {1, 30, 4, {{{3, 2, 12, false}, {9, 2, 7, true}}}};
+  atlas::Placement second = color(0), fourth = color(1);
+  second.part = fourth.part = atlas::part_of(1);
+  const std::vector<atlas::Placement> all{l, second, halves, fourth};
+  const auto first = build(1, {.changed = all}, all, {0x102030, 0x405060});
+  ASSERT_EQ(first.placements.size(), 4u);
+  EXPECT_EQ(first.patches.size(), 2u);
+  EXPECT_EQ(first.placements[0].part, 1);
+  EXPECT_EQ(first.placements[0].l, (gc::LPlacement{9, 2, true, 20}));
+  EXPECT_EQ(first.placements[1].part, 2);
+  EXPECT_EQ(first.placements[1].rgb, 0x102030u);
+  EXPECT_EQ(first.placements[2].halves,
+            (gc::HalvesPlacement{1, 30, 4, {{{3, 2, 12, false}, {9, 2, 7, true}}}}));
+  EXPECT_EQ(first.placements[3].rgb, 0x405060u);
+
+  const auto recolored = build(2, {}, all, {0x102030, 0x40ff60});
+  ASSERT_EQ(recolored.placements.size(), 1u);
+  EXPECT_EQ(recolored.placements[0].patch, 1u);
+  EXPECT_EQ(recolored.placements[0].part, 2);
+  const auto gone = build(3, {.removed = {0}}, {halves, fourth}, {0x40ff60});
+  ASSERT_EQ(gone.placements.size(), 1u);
+  EXPECT_EQ(gone.placements[0].kind, gc::PlacementKind::none);
+  EXPECT_EQ(gone.placements[0].part, 0);
+}
+
 TEST_F(Fixture, DequantisedPositionsStayWithinHalfAStep) {
   const auto frame = build(0, {.changed = {block(0, 0)}}, {block(0, 0)});
   const gc::NewMesh& mesh = frame.meshes[0];

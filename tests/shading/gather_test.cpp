@@ -1,6 +1,7 @@
 // The gather: known answers by position, both paths alike, and the truth's colours.
 #include <gmock/gmock.h>
 
+#include "atlas/addressing/addressing.h"
 #include "scene_builder.h"
 #include "shader_functions.h"
 #include "test_world.h"
@@ -87,7 +88,8 @@ TEST_P(BothPaths, EveryTexelOfATwoTrianglePatchIsLinear) {
   }
 }
 
-// TSS eq. 5: even on the screen of the eye that the codes stand for, so on the surface weights go by 1 / distance.
+// TSS eq. 5: even on the screen of the eye that the codes stand for, so on the surface weights go by 1 /
+// distance.
 TEST_P(BothPaths, SpacedSamplesAreEvenOnTheirEyesScreen) {
   for (uint32_t triangles = 1; triangles <= 3; ++triangles) {
     SceneBuilder b;
@@ -129,6 +131,123 @@ TEST_P(BothPaths, SpacedSamplesAreEvenOnTheirEyesScreen) {
         }
     }
     EXPECT_GT(checked, 300u);
+  }
+}
+
+// What a sample of a triangle with these spaced corners shows: the coordinates of its patch of two.
+dvec2 shown_at(const vec3& s, uint32_t triangle, const std::array<atlas::SpacingCode, 4>& spacing) {
+  const double distance[] = {1, std::exp2(spacing[0] / 21.0), std::exp2(spacing[1] / 21.0)};
+  dvec2 shown(0);
+  double sum = 0;
+  for (int c = 0; c < 3; ++c) {
+    shown += s[c] / distance[c] * dvec2(scene::patch_corner(2, triangle, static_cast<uint32_t>(c)));
+    sum += s[c] / distance[c];
+  }
+  return shown / sum;
+}
+
+void expect_shown(const GatherResult& r, const atlas::addressing::ivec2& at, const dvec2& expected) {
+  const uint8_t* texel = r.atlas.at(static_cast<uint32_t>(at.x), static_cast<uint32_t>(at.y));
+  EXPECT_NEAR(linear(texel[0]), expected.x, 0.01) << at.x << "," << at.y;
+  EXPECT_NEAR(linear(texel[1]), expected.y, 0.01) << at.x << "," << at.y;
+  EXPECT_EQ(texel[3], 255);
+}
+
+size_t used_texels(const GatherResult& r) {
+  size_t used = 0;
+  for (size_t i = 3; i < r.atlas.rgba.size(); i += 4) used += r.atlas.rgba[i] != 0;
+  return used;
+}
+
+TEST_P(BothPaths, LsShowTheirTriangles) {
+  namespace addressing = atlas::addressing;
+  SceneBuilder b;
+  b.instance(b.patch(2), b.material(coordinates()));
+  const World world = make_world(b.build());
+  for (const int level : {1, 2, 5, 12}) {
+    for (const int splits : {1, 3}) {
+      Placement p{.patch = 0, .part = atlas::part_of(1), .kind = PlacementKind::l, .x = 90, .y = 2};
+      p.spacing = {21, -10};
+      p.l = {static_cast<uint8_t>(level), static_cast<uint8_t>(splits), level == 5,
+             static_cast<uint16_t>(2 + addressing::l_pair_pitch(level).y)};
+      const GatherResult r = gather(world, {0.5, 0.5, 2}, {&p, 1}, settings());
+      EXPECT_EQ(r.stats.samples, p.texels());
+      EXPECT_EQ(used_texels(r), p.texels());
+      for (int i = 0; i < splits * splits; ++i) {
+        const int half = i + p.l.turned;
+        const addressing::ivec2 pair = addressing::l_pair_place(half / 2, {p.x, p.y}, p.l.next_y, level, 128);
+        const addressing::SplitPlace place = addressing::split_place(i, splits);
+        for (int k = 0; k < addressing::l_samples(level); ++k) {
+          const addressing::ivec2 texel = addressing::l_sample(k, level);
+          const vec3 local = addressing::l_barycentric(texel, level);
+          const vec2 s = place.corner + place.scale * vec2(local.y, local.z);
+          expect_shown(r, pair + addressing::l_pair_texel(texel, half % 2 == 1, level),
+                       shown_at({1 - s.x - s.y, s.x, s.y}, 1, p.spacing));
+        }
+      }
+    }
+  }
+}
+
+TEST_P(BothPaths, HalvesShowTheirTriangles) {
+  namespace addressing = atlas::addressing;
+  SceneBuilder b;
+  b.instance(b.patch(2), b.material(coordinates()));
+  const World world = make_world(b.build());
+  for (const uint8_t apex : {0, 1, 2}) {
+    Placement p{.patch = 0, .part = atlas::part_of(0), .kind = PlacementKind::halves};
+    p.spacing = {21, -10};
+    p.halves = {apex, 20, 6, {{{2, 4, 4, true}, {20, 30, 40, false}}}};
+    const GatherResult r = gather(world, {0.5, 0.5, 2}, {&p, 1}, settings());
+    EXPECT_EQ(r.stats.samples, p.texels());
+    EXPECT_EQ(r.stats.half_samples, p.texels());
+    EXPECT_EQ(used_texels(r), p.texels());
+    uint64_t outside = 0;
+    for (int h = 0; h < 2; ++h) {
+      const atlas::HalfPlace& half = p.halves.half[h];
+      const addressing::ivec2 size = addressing::half_staircase(p.halves.across, half.along);
+      for (int k = 0; k < addressing::staircase_samples(size); ++k) {
+        const addressing::ivec2 at = addressing::staircase_position(k, size);
+        if (at.x * size.y + at.y * size.x > size.x * size.y) {
+          ++outside;
+          continue;
+        }
+        const addressing::HalfSample sample = addressing::half_weights(
+            at, p.halves.across, half.along, h, addressing::foot_from_code(p.halves.foot));
+        vec3 s;
+        s[apex] = sample.weights.y;
+        s[(apex + 2) % 3] = sample.weights.x;
+        s[(apex + 1) % 3] = 1 - sample.weights.x - sample.weights.y;
+        expect_shown(r, addressing::ivec2(half.x, half.y) + addressing::half_texel(at, size, half.turned),
+                     shown_at(s, 0, p.spacing));
+      }
+    }
+    EXPECT_EQ(r.stats.half_samples_outside, outside);
+  }
+}
+
+TEST_P(BothPaths, MaskedLsCarryCoverageInTheTurnedOne) {
+  namespace addressing = atlas::addressing;
+  SceneBuilder b;
+  b.instance(b.patch(2), b.material(wavy(b, true)));
+  const World world = make_world(b.build());
+  Placement p{
+      .patch = 0, .part = atlas::part_of(0), .kind = PlacementKind::l, .x = 4, .y = 4, .masked = true};
+  p.l.level = 20;
+  const GatherResult r = gather(world, {0.5, 0.5, 2}, {&p, 1}, settings());
+  EXPECT_EQ(used_texels(r), p.texels());
+  for (int k = 0; k < addressing::l_samples(20); ++k) {
+    const addressing::ivec2 texel = addressing::l_sample(k, 20);
+    const addressing::ivec2 at = addressing::ivec2(4) + addressing::l_pair_texel(texel, true, 20);
+    const uint8_t* grey = r.atlas.at(static_cast<uint32_t>(at.x), static_cast<uint32_t>(at.y));
+    EXPECT_TRUE(grey[0] == grey[1] && grey[0] == grey[2]);
+    const float u = addressing::l_barycentric(texel, 20).y;  // alpha is 0 in the left half
+    if (u < 0.42f) {
+      EXPECT_LT(grey[0], 20) << u;
+    }
+    if (u > 0.58f) {
+      EXPECT_GT(grey[0], 235) << u;
+    }
   }
 }
 

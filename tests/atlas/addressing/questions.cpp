@@ -113,6 +113,30 @@ void ask_corners(List& list) {
           list.ask(ivec4(count, corner / 3, corner % 3, 0), vec4(w - 1, h - 1, 0, 0));
 }
 
+void ask_samples(List& list) {
+  for (int level = 1; level <= kMaxTessellationLevel; ++level)
+    for (int i = 0; i < l_samples(level); ++i) list.ask(ivec4(level, i, 0, 0));
+}
+
+void ask_split_points(List& list) {
+  for (int n = 1; n <= kMaxSplits; ++n)
+    for (int i = 0; i < 300; ++i) list.ask(ivec4(n), list.point());
+}
+
+void ask_split_places(List& list) {
+  for (int n = 1; n <= kMaxSplits; ++n)
+    for (int i = 0; i < n * n; ++i) list.ask(ivec4(n, i, 0, 0));
+}
+
+void ask_pair_places(List& list) {
+  for (int level = 1; level <= kMaxTessellationLevel; ++level)
+    for (int i = 0; i < 60; ++i) list.ask(ivec4(level, i, 6 * i, 80));
+}
+
+void ask_half_texels(List& list) {
+  for (int i = 0; i < 2000; ++i) list.ask(ivec4(i % 2, 1 + i % 128, 1 + i % 1000, i % 90 | (i % 70) << 7));
+}
+
 }  // namespace
 
 int function_count() {
@@ -121,16 +145,18 @@ int function_count() {
 
 const char* function_name(int function) {
   constexpr const char* kNames[kFunctions] = {
-      "levels",    "l_texels",   "l_position", "l_pair_owner", "l_pair_position", "oversampling_id",
-      "staircase", "to_surface", "to_grid",    "ratio_code",   "block_point",     "block_corner"};
+      "levels",    "l_texels",    "l_position",  "l_pair_owner", "l_pair_position", "oversampling_id",
+      "staircase", "to_surface",  "to_grid",     "ratio_code",   "block_point",     "block_corner",
+      "l_sample",  "split_point", "split_place", "l_pair_place", "half_texel"};
   return kNames[function];
 }
 
 std::vector<Question> questions(int function) {
   using Ask = void (*)(List&);
-  constexpr Ask kAsk[kFunctions] = {ask_levels,         ask_texels, ask_positions,  ask_pair_texels,
-                                    ask_pair_positions, ask_ids,    ask_staircases, ask_perspective,
-                                    ask_perspective,    ask_ratios, ask_blocks,     ask_corners};
+  constexpr Ask kAsk[kFunctions] = {
+      ask_levels,     ask_texels,       ask_positions,    ask_pair_texels, ask_pair_positions, ask_ids,
+      ask_staircases, ask_perspective,  ask_perspective,  ask_ratios,      ask_blocks,         ask_corners,
+      ask_samples,    ask_split_points, ask_split_places, ask_pair_places, ask_half_texels};
   List list;
   kAsk[function](list);
   return list.take();

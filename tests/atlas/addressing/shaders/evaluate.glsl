@@ -1,12 +1,15 @@
 // Every function of atlas/addressing by number, so that one list of questions can be put to each of its compilations.
 #include "atlas/addressing/block.glsl"
+#include "atlas/addressing/halves.glsl"
 #include "atlas/addressing/l_packing.glsl"
 #include "atlas/addressing/oversampling.glsl"
 #include "atlas/addressing/perspective.glsl"
+#include "atlas/addressing/split.glsl"
 #include "atlas/addressing/tessellation.glsl"
 
 const int kLevels = 0, kTexels = 1, kPosition = 2, kPairTexel = 3, kPairPosition = 4, kSampleId = 5, kStaircase = 6, kSurface = 7,
-          kGrid = 8, kRatio = 9, kBlockPoint = 10, kBlockCorner = 11, kFunctions = 12;
+          kGrid = 8, kRatio = 9, kBlockPoint = 10, kBlockCorner = 11, kSample = 12, kSplitPoint = 13, kSplitPlace = 14, kPairPlace = 15, kHalfTexel = 16,
+          kFunctions = 17;
 
 struct Answer {
   ivec4 n;
@@ -68,6 +71,25 @@ Answer evaluate(int function, ivec4 n, vec4 x) {
     ivec2 offset = block_coverage_offset(ivec2(int(x.x), int(x.y)));
     a.n = ivec4(offset.x, offset.y, 0, 0);
     a.x = vec4(at.x, at.y, 0.0f, 0.0f);
+  } else if (function == kSample) {
+    ivec2 at = l_sample(n.y, n.x);
+    LSteps steps = l_steps(at, n.x);
+    a.n = ivec4(at.x, at.y, l_samples(n.x), 0);
+    a.x = vec4(steps.ddx.y, steps.ddx.z, steps.ddy.y, steps.ddy.z);
+  } else if (function == kSplitPoint) {
+    SplitPoint point = split_point(lambda, n.x);
+    a.n.x = point.index;
+  } else if (function == kSplitPlace) {
+    SplitPlace place = split_place(n.y, n.x);
+    a.x = vec4(place.corner.x, place.corner.y, place.scale, 0.0f);
+  } else if (function == kPairPlace) {
+    ivec2 at = l_pair_place(n.y, ivec2(n.z, 8), n.w, n.x, 512);
+    a.n = ivec4(at.x, at.y, 0, 0);
+  } else if (function == kHalfTexel) {
+    ivec2 size = half_staircase(n.y, n.z);
+    ivec2 texel = half_texel(ivec2(n.w & 127, n.w >> 7), size, n.x == 1);
+    ivec2 back = half_sample(texel, size, n.x == 1);
+    a.n = ivec4(texel.x, texel.y, back.x, back.y);
   }
   return a;
 }
