@@ -6,8 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "absl/strings/str_join.h"
 #include "base/frame_trace.h"
 #include "base/log.h"
+#include "bench/codec_study.h"
 #include "bench/culling.h"
 #include "bench/file_io.h"
 #include "bench/loopback.h"
@@ -24,7 +26,7 @@ enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
 constexpr char kFooter[] =
     R"(Configuration: every option is also an environment variable (--delay-ms = TESSERA_BENCH_DELAY_MS) and a key
-of the --config file, under [loopback], [culling], [memory] or [spatial]. Flags win over the file, the file over the environment.
+of the --config file, under [loopback], [culling], [memory], [spatial] or [codec]. Flags win over the file, the file over the environment.
 
 Exit codes: 0 done, 1 the run failed, 2 wrong usage.)";
 
@@ -43,6 +45,13 @@ int report_failure(const Status& status) {
 
 constexpr char kCullingFooter[] = R"(Example:
   tessera-bench culling --scene viking_village.glb --path viking_village_1.csv --seconds 1)";
+
+constexpr char kCodecFooter[] = R"(Examples:
+  tessera-bench codec --mtexels 1,2
+  tessera-bench codec --scene sponza.glb --path sponza_1.csv --start 10 --size 1920x1080 --mtexels 8 --json codec.json
+
+Atlases of the scene are filled up with their own squares, so that every texel holds a sample, or every other square of
+64x64 is left empty; then both codecs code them in turn. The lower table is of the client's picture, the atlas as it is.)";
 
 constexpr char kMemoryFooter[] = R"(Examples:
   tessera-bench memory --frames 0 --json speed.json
@@ -179,6 +188,43 @@ int run_spatial(const bench::SpatialSettings& settings) {
   return kOk;
 }
 
+void print_summary(const bench::CodecStudyResult& result) {
+  std::cout << absl::StrFormat("%-5s %-10s %5s %16s %16s %11s %7s %7s  %s\n", "codec", "atlas", "fill",
+                               "encode ms/Mtexel", "decode ms/Mtexel", "bits/sample", "ssim", "psnr",
+                               "half empty / full: encode, decode, equal quality");
+  for (const bench::CodecRow& row : result.rows) {
+    std::cout << absl::StrFormat("%-5s %-10s %5.2f %16.2f %16.2f %11.3f %7.4f %7.2f",
+                                 std::string(name_of(row.codec)), absl::StrCat(row.width, "x", row.height),
+                                 row.fill, row.encode_ms_per_mtexel.p50, row.decode_ms_per_mtexel.p50,
+                                 row.bits_per_sample, row.ssim, row.psnr);
+    if (row.equal_quality_share)
+      std::cout << absl::StrFormat("  %.3f, %.3f, %.3f", *row.encode_time_share, *row.decode_time_share,
+                                   *row.equal_quality_share);
+    std::cout << "\n";
+  }
+  std::cout << absl::StrFormat("%-5s %-10s %5s %7s %7s %7s\n", "codec", "atlas", "used", "Mbit", "mssim",
+                               "psnr");
+  for (const bench::CodecPictureRow& row : result.pictures)
+    std::cout << absl::StrFormat("%-5s %-10s %5.2f %7.2f %7.4f %7.2f\n", std::string(name_of(row.codec)),
+                                 absl::StrCat(row.width, "x", row.height), row.used, row.mbits, row.mssim,
+                                 row.psnr);
+}
+
+int run_codec(const bench::CodecStudySettings& settings) {
+  const SteadyClock clock;
+  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
+  StatusOr<bench::CodecStudyResult> result = bench::run_codec_study(settings, progress);
+  if (!result.ok()) return report_failure(result.status());
+  result->command =
+      absl::StrCat(command_line("tessera-bench codec", settings.common),
+                   " --mtexels=", absl::StrJoin(settings.mtexels, ","),
+                   " --bits-per-texel=", settings.bits_per_texel, " --rounds=", settings.rounds);
+  print_summary(*result);
+  if (settings.common.json.empty()) return kOk;
+  const Status written = bench::write_file(settings.common.json, bench::to_json(*result).dump(1) + "\n");
+  return written.ok() ? kOk : report_failure(written);
+}
+
 int run_report(const std::string& folder) {
   const Status written = bench::write_report(folder);
   if (!written.ok()) return report_failure(written);
@@ -236,6 +282,12 @@ int main(int argc, char** argv) {
   spatial->footer(kSpatialFooter);
   spatial->fallthrough();
 
+  CLI::App* codec = app.add_subcommand("codec", "time, bits and error of the atlas's codecs");
+  bench::CodecStudySettings codec_settings;
+  bench::add_options(*codec, codec_settings);
+  codec->footer(kCodecFooter);
+  codec->fallthrough();
+
   CLI::App* report = app.add_subcommand("report", "one page from all runs in a folder");
   std::string folder;
   report->add_option("folder", folder, "where `loopback --report` left its runs")
@@ -252,5 +304,6 @@ int main(int argc, char** argv) {
   if (loopback->parsed()) return run_loopback(settings);
   if (memory->parsed()) return run_memory(memory_settings);
   if (culling->parsed()) return run_culling(culling_settings);
+  if (codec->parsed()) return run_codec(codec_settings);
   return spatial->parsed() ? run_spatial(spatial_settings) : run_report(folder);
 }

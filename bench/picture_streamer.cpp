@@ -56,9 +56,9 @@ StatusOr<std::unique_ptr<PictureStreamer>> PictureStreamer::create(PictureMethod
   impl->rate = {.bitrate_bps = settings.bitrate_mbps * 1e6, .frames_per_second = settings.server_fps};
   const View view = impl->source_view({});
   const codec::EncoderSettings video{.width = view.width,
-                                   .height = view.height,
-                                   .frames_per_second = settings.server_fps,
-                                   .bitrate_bps = settings.bitrate_mbps * 1e6};
+                                     .height = view.height,
+                                     .frames_per_second = settings.server_fps,
+                                     .bitrate_bps = settings.bitrate_mbps * 1e6};
   TESSERA_ASSIGN_OR_RETURN(impl->encoder, codec::VideoEncoder::create(video));
   TESSERA_ASSIGN_OR_RETURN(impl->decoder, codec::VideoDecoder::create());
   if (method == PictureMethod::mesh_warp) {

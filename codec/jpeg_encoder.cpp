@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "codec/mcu_tiles.h"
 #include "codec/parallel.h"
@@ -11,12 +12,23 @@ namespace tessera::codec {
 namespace {
 
 // Aimed at a little below the budget; what is above it, or below this share, is worth another try.
-constexpr double kAim = 0.96, kGoodShare = 0.9;
-constexpr int kTries = 4, kMostTries = 12;  // while one fits already; while none does
+constexpr double kAim = 0.98, kGoodShare = 0.93;
+constexpr int kTries = 3, kMostTries = 8;  // with the whole picture: while one fits already; while none does
+constexpr int kPlanTries = 6;              // with its sample,
+constexpr double kPlanError = 0.01;        // or as near as that
 
-// The next scale to try: the guess, but inside what earlier tries have left.
-double narrowed(double guess, double too_fine, double fits) {
-  return guess > 1.001 * too_fine && guess < 0.999 * fits ? guess : std::sqrt(too_fine * fits);
+// The sample: every n-th run of squares, each a row of a tile, so that neighbours stay neighbours.
+constexpr size_t kRunMcus = 16, kSampleEvery = 24, kMinSampleRuns = 16;
+
+std::vector<uint32_t> sample_of(std::span<const uint32_t> mcus) {
+  const size_t runs = (mcus.size() + kRunMcus - 1) / kRunMcus;
+  const size_t taken = std::min(runs, std::max(kMinSampleRuns, runs / kSampleEvery));
+  std::vector<uint32_t> sample;
+  for (size_t i = 0; i < taken; ++i) {
+    const auto run = mcus.subspan(i * runs / taken * kRunMcus);
+    sample.insert(sample.end(), run.begin(), run.begin() + std::min(kRunMcus, run.size()));
+  }
+  return sample;
 }
 
 }  // namespace
@@ -45,14 +57,32 @@ void JpegEncoder::gather_tiles(const AtlasPicture& picture) {
   tiles_.resize(tile_count(mcus_.size()));
   for_each_part(tiles_.size(), compressors_.size(),
                 [&](size_t, size_t i) { gather(picture, mcus_of_tile(mcus_, i), tiles_[i]); });
+  const std::vector<uint32_t> sample = sample_of(mcus_);
+  gather(picture, sample, sample_);
+  sample_share_ = static_cast<double>(sample.size()) / static_cast<double>(mcus_.size());
 }
 
-StatusOr<JpegEncoder::Coded> JpegEncoder::compress(double scale) {
-  Coded coded{.scale = scale};
-  TESSERA_ASSIGN_OR_RETURN(coded.tables, compressors_[0].tables(scale));
+StatusOr<JpegEncoder::Plan> JpegEncoder::plan_for(double bits) {
+  const auto mcus = static_cast<double>(mcus_.size());
+  Plan plan;
+  for (int tries = 1;; ++tries) {
+    plan.scale = search_.scale_for(bits / mcus);
+    TESSERA_ASSIGN_OR_RETURN(plan.codes, compressors_[0].codes_for(sample_, plan.scale));
+    TESSERA_ASSIGN_OR_RETURN(const auto tile, compressors_[0].compress(sample_, plan.scale, plan.codes));
+    plan.expected_bits = 8.0 * static_cast<double>(tile.size()) / sample_share_ * whole_to_sample_;
+    search_.learn(plan.scale, plan.expected_bits / mcus, tries > 1);
+    const bool near = std::abs(plan.expected_bits - bits) <= kPlanError * bits;
+    if (near || tries == kPlanTries || search_.scale_for(bits / mcus) == plan.scale) return plan;
+  }
+}
+
+StatusOr<JpegEncoder::Coded> JpegEncoder::compress(const Plan& plan) {
+  Coded coded;
+  TESSERA_ASSIGN_OR_RETURN(coded.tables, compressors_[0].tables(plan.scale, plan.codes));
   std::vector<StatusOr<std::vector<uint8_t>>> done(tiles_.size());
-  for_each_part(tiles_.size(), compressors_.size(),
-                [&](size_t worker, size_t i) { done[i] = compressors_[worker].compress(tiles_[i], scale); });
+  for_each_part(tiles_.size(), compressors_.size(), [&](size_t worker, size_t i) {
+    done[i] = compressors_[worker].compress(tiles_[i], plan.scale, plan.codes);
+  });
   for (auto& tile : done) {
     TESSERA_RETURN_IF_ERROR(tile.status());
     coded.tiles.push_back(*std::move(tile));
@@ -61,22 +91,20 @@ StatusOr<JpegEncoder::Coded> JpegEncoder::compress(double scale) {
 }
 
 StatusOr<JpegEncoder::Coded> JpegEncoder::compress_within(double budget_bits) {
-  const auto mcus = static_cast<double>(mcus_.size());
-  double too_fine = kFinestScale, fits = kCoarsestScale;  // bounds of the scales that are still worth a try
-  double scale = search_.scale_for(kAim * budget_bits / mcus);
   Coded best;
+  double aim = kAim * budget_bits;
   for (int tries = 1;; ++tries) {
-    TESSERA_ASSIGN_OR_RETURN(Coded coded, compress(scale));
+    TESSERA_ASSIGN_OR_RETURN(const Plan plan, plan_for(aim));
+    TESSERA_ASSIGN_OR_RETURN(Coded coded, compress(plan));
     const double bits = coded.bits();
-    search_.learn(scale, bits / mcus, tries > 1);
-    const bool good = bits <= budget_bits;
-    (good ? fits : too_fine) = scale;
-    if (good || best.tiles.empty() || best.bits() > budget_bits) best = std::move(coded);
-    const bool done = good && (bits >= kGoodShare * budget_bits || scale <= kFinestScale || tries >= kTries);
-    if (done || tries == kMostTries || (!good && scale >= kCoarsestScale)) return best;
-    const double guess = search_.scale_for(kAim * budget_bits / mcus);
-    const bool at_an_end = (good && guess <= kFinestScale) || (!good && guess >= kCoarsestScale);
-    scale = at_an_end ? guess : narrowed(guess, too_fine, fits);
+    whole_to_sample_ *= bits / plan.expected_bits;
+    const bool fits = bits <= budget_bits;
+    if (best.tiles.empty() || (fits ? bits > best.bits() || best.bits() > budget_bits : bits < best.bits()))
+      best = std::move(coded);
+    const bool at_an_end = plan.scale <= kFinestScale ? fits : !fits && plan.scale >= kCoarsestScale;
+    const bool good = fits && (bits >= kGoodShare * budget_bits || tries >= kTries);
+    if (good || at_an_end || tries == kMostTries) return best;
+    if (!fits) aim *= kAim;  // small pictures are hard to foretell
   }
 }
 

@@ -11,6 +11,7 @@
 
 namespace tessera::codec {
 
+// A small part of the picture stands for the whole where the scale is searched and the codes are made.
 class JpegEncoder final : public AtlasEncoder {
  public:
   static StatusOr<std::unique_ptr<JpegEncoder>> create(uint32_t width, uint32_t height);
@@ -20,8 +21,12 @@ class JpegEncoder final : public AtlasEncoder {
   const std::string& choice() const override { return choice_; }
 
  private:
-  struct Coded {
+  struct Plan {
     double scale = 0;
+    JpegCodes codes;
+    double expected_bits = 0;
+  };
+  struct Coded {
     std::vector<uint8_t> tables;
     std::vector<std::vector<uint8_t>> tiles;
     double bits() const;
@@ -29,16 +34,22 @@ class JpegEncoder final : public AtlasEncoder {
 
   JpegEncoder(uint32_t width, uint32_t height);
   void gather_tiles(const AtlasPicture& picture);
-  StatusOr<Coded> compress(double scale);
+  StatusOr<Plan> plan_for(double bits);
+  StatusOr<Coded> compress(const Plan& plan);
   StatusOr<Coded> compress_within(double budget_bits);
 
   const uint32_t width_, height_;
   std::string choice_;
   Occupancy all_;                            // for pictures without gaps
   std::vector<JpegCompressor> compressors_;  // one a worker
-  std::vector<uint32_t> mcus_;               // of the current picture, likewise:
+  // Of the current picture, kept for their memory:
+  std::vector<uint32_t> mcus_;
   std::vector<YuvImage> tiles_;
+  YuvImage sample_;
+  double sample_share_ = 1;  // of the squares
+  // From picture to picture:
   ScaleSearch search_;
+  double whole_to_sample_ = 1;  // bits of a square in the picture, divided by those of one in its sample
 };
 
 }  // namespace tessera::codec

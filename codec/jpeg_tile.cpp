@@ -76,10 +76,14 @@ struct JpegCompressor::Impl {
 
   bool set_up();
   void set_scale(double scale);
-  size_t written() const { return buffer.size() - destination.free_in_buffer; }
-  bool write_tables(double scale);
-  bool write_picture(const YuvImage& picture, double scale);
-  StatusOr<std::vector<uint8_t>> result(bool good) const;
+  void set_codes(const JpegCodes& codes);
+  JpegCodes codes() const;
+  void begin_output(size_t luma_samples);
+  bool write_tables(double scale, const JpegCodes& codes);
+  // Without `codes` it makes its own.
+  bool write_picture(const YuvImage& picture, double scale, const JpegCodes* codes);
+  void write_lines(const YuvImage& picture);
+  StatusOr<std::vector<uint8_t>> result(bool good);
 };
 
 bool JpegCompressor::Impl::set_up() {
@@ -114,21 +118,62 @@ void JpegCompressor::Impl::set_scale(double scale) {
   }
 }
 
-bool JpegCompressor::Impl::write_tables(double scale) {
+void JpegCompressor::Impl::set_codes(const JpegCodes& codes) {
+  const auto set = [](JHUFF_TBL* table, const JpegCode& code) {
+    std::ranges::copy(code.counts, table->bits);
+    std::ranges::copy(code.symbols, table->huffval);
+  };
+  for (size_t table = 0; table < 2; ++table) {
+    set(codec.dc_huff_tbl_ptrs[table], codes.dc[table]);
+    set(codec.ac_huff_tbl_ptrs[table], codes.ac[table]);
+  }
+}
+
+JpegCodes JpegCompressor::Impl::codes() const {
+  const auto get = [](const JHUFF_TBL* table, JpegCodeKind kind) {
+    JpegCode code;
+    std::ranges::copy(table->bits, code.counts.begin());
+    std::ranges::copy(table->huffval, code.symbols.begin());
+    return completed(code, kind);
+  };
+  JpegCodes codes;
+  for (size_t table = 0; table < 2; ++table) {
+    codes.dc[table] = get(codec.dc_huff_tbl_ptrs[table], JpegCodeKind::dc);
+    codes.ac[table] = get(codec.ac_huff_tbl_ptrs[table], JpegCodeKind::ac);
+  }
+  return codes;
+}
+
+void JpegCompressor::Impl::begin_output(size_t luma_samples) {
+  buffer.resize(std::max(buffer.size(), max_compressed_bytes(luma_samples)));
+  destination.next_output_byte = buffer.data();
+  destination.free_in_buffer = buffer.size();
+}
+
+bool JpegCompressor::Impl::write_tables(double scale, const JpegCodes& codes) {
   if (setjmp(errors.jump)) return false;
   set_scale(scale);
+  set_codes(codes);
   jpeg_suppress_tables(&codec, FALSE);
   jpeg_write_tables(&codec);
   return true;
 }
 
-bool JpegCompressor::Impl::write_picture(const YuvImage& picture, double scale) {
+bool JpegCompressor::Impl::write_picture(const YuvImage& picture, double scale, const JpegCodes* codes) {
   if (setjmp(errors.jump)) return false;
   codec.image_width = picture.width;
   codec.image_height = picture.height;
+  codec.optimize_coding = codes ? FALSE : TRUE;
   set_scale(scale);
+  if (codes) set_codes(*codes);
   jpeg_suppress_tables(&codec, TRUE);
   jpeg_start_compress(&codec, FALSE);
+  write_lines(picture);
+  jpeg_finish_compress(&codec);
+  return true;
+}
+
+void JpegCompressor::Impl::write_lines(const YuvImage& picture) {
   McuRow row;
   for (uint32_t line = 0; line < picture.height; line += kMcuRows) {
     // libjpeg's interface knows no const; it only reads.
@@ -136,35 +181,38 @@ bool JpegCompressor::Impl::write_picture(const YuvImage& picture, double scale) 
                  const_cast<JSAMPLE*>(picture.v.data()), picture.width, line);
     jpeg_write_raw_data(&codec, row.planes.data(), kMcuRows);
   }
-  jpeg_finish_compress(&codec);
-  return true;
 }
 
-StatusOr<std::vector<uint8_t>> JpegCompressor::Impl::result(bool good) const {
-  if (!good) return absl::InternalError(absl::StrCat("libjpeg: ", errors.message()));
-  return std::vector<uint8_t>(buffer.begin(), buffer.begin() + static_cast<ptrdiff_t>(written()));
+StatusOr<std::vector<uint8_t>> JpegCompressor::Impl::result(bool good) {
+  if (!good) {
+    jpeg_abort_compress(&codec);
+    return absl::InternalError(absl::StrCat("libjpeg: ", errors.message()));
+  }
+  return std::vector<uint8_t>(buffer.data(), buffer.data() + buffer.size() - destination.free_in_buffer);
 }
 
 JpegCompressor::JpegCompressor() : impl_(std::make_unique<Impl>()) {}
 JpegCompressor::~JpegCompressor() = default;
 JpegCompressor::JpegCompressor(JpegCompressor&&) noexcept = default;
 
-StatusOr<std::vector<uint8_t>> JpegCompressor::tables(double scale) {
+StatusOr<JpegCodes> JpegCompressor::codes_for(const YuvImage& picture, double scale) {
   Impl& c = *impl_;
-  c.buffer.resize(std::max(c.buffer.size(), max_compressed_bytes(0)));
-  c.destination.next_output_byte = c.buffer.data();
-  c.destination.free_in_buffer = c.buffer.size();
-  return c.result(c.ready && c.write_tables(scale));
+  c.begin_output(picture.y.size());
+  TESSERA_RETURN_IF_ERROR(c.result(c.ready && c.write_picture(picture, scale, nullptr)).status());
+  return c.codes();
 }
 
-StatusOr<std::vector<uint8_t>> JpegCompressor::compress(const YuvImage& picture, double scale) {
+StatusOr<std::vector<uint8_t>> JpegCompressor::tables(double scale, const JpegCodes& codes) {
   Impl& c = *impl_;
-  c.buffer.resize(std::max(c.buffer.size(), max_compressed_bytes(picture.y.size())));
-  c.destination.next_output_byte = c.buffer.data();
-  c.destination.free_in_buffer = c.buffer.size();
-  const bool good = c.ready && c.write_picture(picture, scale);
-  if (!good) jpeg_abort_compress(&c.codec);
-  return c.result(good);
+  c.begin_output(0);
+  return c.result(c.ready && c.write_tables(scale, codes));
+}
+
+StatusOr<std::vector<uint8_t>> JpegCompressor::compress(const YuvImage& picture, double scale,
+                                                        const JpegCodes& codes) {
+  Impl& c = *impl_;
+  c.begin_output(picture.y.size());
+  return c.result(c.ready && c.write_picture(picture, scale, &codes));
 }
 
 struct JpegDecompressor::Impl {

@@ -9,6 +9,7 @@
 
 #include "base/status.h"
 #include "base/yuv.h"
+#include "codec/jpeg_codes.h"
 
 namespace tessera::codec {
 
@@ -22,11 +23,12 @@ class JpegCompressor {
   ~JpegCompressor();
   JpegCompressor(JpegCompressor&&) noexcept;
 
-  // What tiles of this scale have in common (quantisers and codes), in the standard's abbreviated format for
-  // table specifications.
-  StatusOr<std::vector<uint8_t>> tables(double scale);
-  // The picture without them (abbreviated format for compressed data). Sides: multiples of 16.
-  StatusOr<std::vector<uint8_t>> compress(const YuvImage& picture, double scale);
+  // Pictures have sides that are multiples of 16. The codes that suit this one best, and can code any other.
+  StatusOr<JpegCodes> codes_for(const YuvImage& picture, double scale);
+  // What tiles have in common, in the standard's abbreviated format for table specifications.
+  StatusOr<std::vector<uint8_t>> tables(double scale, const JpegCodes& codes);
+  // The picture without them (abbreviated format for compressed data).
+  StatusOr<std::vector<uint8_t>> compress(const YuvImage& picture, double scale, const JpegCodes& codes);
 
  private:
   struct Impl;

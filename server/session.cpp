@@ -8,6 +8,7 @@
 #include "codec/yuv_converter.h"
 #include "pvs/retention.h"
 #include "server/meta_builder.h"
+#include "server/sample_map.h"
 #include "server/viewers.h"
 
 namespace tessera::server {
@@ -29,12 +30,6 @@ class Stopwatch {
   SteadyClock clock_;
   TimeNs last_ = clock_.now();
 };
-
-void add_samples(const atlas::Placement& placement, codec::Occupancy& used) {
-  atlas::visit_samples(placement, used.width(), [&](const atlas::TexelRectangle& r) {
-    used.add_rectangle(r.x, r.y, r.width, r.height);
-  });
-}
 
 MetaSettings meta_settings(const SessionSettings& settings) {
   return {.atlas_width = static_cast<uint16_t>(settings.layout.width),
@@ -148,8 +143,7 @@ Status Session::Impl::shade(const Pose& pose, FrameStats& stats) {
 codec::AtlasPicture Session::Impl::coded_picture() {
   if (settings.codec != AtlasCodec::jpeg)
     return converter->result();  // video codes what stands still for nothing
-  used.clear();
-  for (const atlas::Placement& placement : layout->placements()) add_samples(placement, used);
+  map_samples(layout->placements(), used);
   return {converter->result(), &used};
 }
 

@@ -199,7 +199,9 @@ TEST(JpegCodec, PartlyUsedBlocksAreAsGoodAsWholeOnes) {
     YuvImage tile, back = grey(kSide, kSide, 0);
     gather({view_of(picture), &told}, mcus, tile);
     JpegCompressor compressor;
-    const auto tables = compressor.tables(1), bytes = compressor.compress(tile, 1);
+    const auto codes = compressor.codes_for(tile, 1);
+    EXPECT_TRUE(codes.ok());
+    const auto tables = compressor.tables(1, *codes), bytes = compressor.compress(tile, 1, *codes);
     EXPECT_TRUE(tables.ok() && bytes.ok());
     EXPECT_TRUE(JpegDecompressor().decompress(*tables, *bytes, tile).ok());
     scatter(tile, mcus, back);
