@@ -172,12 +172,8 @@ LevelWish select_level(const BlockNeed& need, bool masked, float bias, const Lev
   return wish_of(shape, masked, max_log);
 }
 
-// The use is a falling step function of the bias. Its inverse is searched on a fixed grid, so that the result
-// is monotonic in the target.
-float select_bias(std::span<const float> ideal_areas, double target_texels, const LevelSettings& settings) {
+float least_bias(const LevelSettings& settings, const std::function<bool(float)>& fits) {
   constexpr float kStep = 1.0f / 64;
-  const AreaHistogram histogram(ideal_areas);
-  const auto fits = [&](float bias) { return histogram.texels(bias, settings) <= target_texels; };
   if (fits(settings.min_bias)) return settings.min_bias;
   int too_small = 0;
   int enough = static_cast<int>(std::ceil((settings.max_bias - settings.min_bias) / kStep));
@@ -186,6 +182,12 @@ float select_bias(std::span<const float> ideal_areas, double target_texels, cons
     (fits(settings.min_bias + kStep * static_cast<float>(middle)) ? enough : too_small) = middle;
   }
   return std::min(settings.max_bias, settings.min_bias + kStep * static_cast<float>(enough));
+}
+
+float select_bias(std::span<const float> ideal_areas, double target_texels, const LevelSettings& settings) {
+  const AreaHistogram histogram(ideal_areas);
+  const auto fits = [&](float bias) { return histogram.texels(bias, settings) <= target_texels; };
+  return least_bias(settings, fits);
 }
 
 float BiasFollower::follow(float needed) {

@@ -119,6 +119,14 @@ void print_summary(const bench::LoopbackResult& result) {
   }
 }
 
+// Where one was asked for.
+template <class Result>
+int write_json(const std::string& path, const Result& result) {
+  if (path.empty()) return kOk;
+  const Status written = bench::write_file(path, bench::to_json(result).dump(1) + "\n");
+  return written.ok() ? kOk : report_failure(written);
+}
+
 int run_loopback(const bench::LoopbackSettings& settings) {
   const SteadyClock clock;
   bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
@@ -144,9 +152,7 @@ int run_culling(const bench::LoopbackSettings& settings) {
                                ratio.p50, ratio.p95, result->frames.front().ratio());
   std::cout << "visible sets: " << result->differing_patches() << " patches differ in all frames together"
             << std::endl;
-  if (settings.json.empty()) return kOk;
-  const Status written = bench::write_file(settings.json, bench::to_json(*result).dump(1) + "\n");
-  return written.ok() ? kOk : report_failure(written);
+  return write_json(settings.json, *result);
 }
 
 int run_memory(const bench::MemorySettings& settings) {
@@ -156,9 +162,7 @@ int run_memory(const bench::MemorySettings& settings) {
   if (!result.ok()) return report_failure(result.status());
   result->command = command_line("tessera-bench memory", settings);
   std::cout << bench::to_text(*result) << std::flush;
-  if (settings.shared.json.empty()) return kOk;
-  const Status written = bench::write_file(settings.shared.json, bench::to_json(*result).dump(1) + "\n");
-  return written.ok() ? kOk : report_failure(written);
+  return write_json(settings.shared.json, *result);
 }
 
 int run_spatial(const bench::SpatialSettings& settings) {
@@ -177,10 +181,7 @@ int run_spatial(const bench::SpatialSettings& settings) {
                                  100 * (1 - row.per_pixel), row.to_mono, row.mssim, row.mssim_center,
                                  100 * row.holes);
   }
-  if (!settings.common.json.empty()) {
-    const Status written = bench::write_file(settings.common.json, bench::to_json(*result).dump(1) + "\n");
-    if (!written.ok()) return report_failure(written);
-  }
+  if (const int code = write_json(settings.common.json, *result); code != kOk) return code;
   if (settings.common.report.empty()) return kOk;
   const Status written = bench::write_spatial_report(settings.common.report, *result);
   if (!written.ok()) return report_failure(written);
@@ -220,9 +221,7 @@ int run_codec(const bench::CodecStudySettings& settings) {
                    " --mtexels=", absl::StrJoin(settings.mtexels, ","),
                    " --bits-per-texel=", settings.bits_per_texel, " --rounds=", settings.rounds);
   print_summary(*result);
-  if (settings.common.json.empty()) return kOk;
-  const Status written = bench::write_file(settings.common.json, bench::to_json(*result).dump(1) + "\n");
-  return written.ok() ? kOk : report_failure(written);
+  return write_json(settings.common.json, *result);
 }
 
 int run_report(const std::string& folder) {

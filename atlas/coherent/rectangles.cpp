@@ -86,21 +86,13 @@ uvec2 sides_of(const RectangleSize& size, bool masked) {
 }
 
 float select_bias(std::span<const Wanted> wanted, double target_texels, const LevelSettings& settings) {
-  constexpr float kStep = 1.0f / 64;
   const auto fits = [&](float bias) {
     uint64_t sum = 0;
     for (const Wanted& w : wanted)
       sum += texels(select_size(w.need, w.masked, bias, nullptr, settings), w.masked);
     return static_cast<double>(sum) <= target_texels;
   };
-  if (fits(settings.min_bias)) return settings.min_bias;
-  int too_small = 0;
-  int enough = static_cast<int>(std::ceil((settings.max_bias - settings.min_bias) / kStep));
-  while (enough - too_small > 1) {
-    const int middle = (too_small + enough) / 2;
-    (fits(settings.min_bias + kStep * static_cast<float>(middle)) ? enough : too_small) = middle;
-  }
-  return std::min(settings.max_bias, settings.min_bias + kStep * static_cast<float>(enough));
+  return least_bias(settings, fits);
 }
 
 }  // namespace tessera::atlas::coherent

@@ -151,22 +151,13 @@ uint64_t texels_of(const Shape& shape, bool masked) {
 
 float select_bias(std::span<const TriangleNeed> needs, double target_texels, const LayoutSettings& settings,
                   const ShapeLimits& limits) {
-  constexpr float kStep = 1.0f / 64;
-  const LevelSettings& levels = settings.levels;
   const auto fits = [&](float bias) {
     uint64_t sum = 0;
     for (const TriangleNeed& need : needs)
       sum += texels_of(select_shape(need, bias, settings, limits), need.masked);
     return static_cast<double>(sum) <= target_texels;
   };
-  if (fits(levels.min_bias)) return levels.min_bias;
-  int too_small = 0;
-  int enough = static_cast<int>(std::ceil((levels.max_bias - levels.min_bias) / kStep));
-  while (enough - too_small > 1) {
-    const int middle = (too_small + enough) / 2;
-    (fits(levels.min_bias + kStep * static_cast<float>(middle)) ? enough : too_small) = middle;
-  }
-  return std::min(levels.max_bias, levels.min_bias + kStep * static_cast<float>(enough));
+  return least_bias(settings.levels, fits);
 }
 
 }  // namespace tessera::atlas::tessellated
