@@ -12,6 +12,7 @@
 #include "bench/codec_study.h"
 #include "bench/culling.h"
 #include "bench/file_io.h"
+#include "bench/layout_study.h"
 #include "bench/loopback.h"
 #include "bench/memory.h"
 #include "bench/report.h"
@@ -57,6 +58,11 @@ constexpr char kMemoryFooter[] = R"(Examples:
   tessera-bench memory --frames 0 --json speed.json
   tessera-bench memory --patches 0 --scene sponza.glb --path sponza_1.csv --server-fps 60
   tessera-bench memory --patches 0 --scene robot_lab.glb --path robot_lab_3.csv --atlas 2048x1024 --json lab.json)";
+
+constexpr char kLayoutsFooter[] = R"(Examples:
+  tessera-bench layouts
+  tessera-bench layouts --scene sponza.glb --path sponza_1.csv --seconds 3 --json layouts.json --report report
+  tessera-bench layouts --atlases 2048x1024 --bitrates-mbps 5,10,20,40 --speed 0.25)";
 
 constexpr char kSpatialFooter[] = R"(Examples:
   tessera-bench spatial --report report
@@ -224,6 +230,23 @@ int run_codec(const bench::CodecStudySettings& settings) {
   return write_json(settings.common.json, *result);
 }
 
+int run_layouts(const bench::LayoutStudySettings& settings) {
+  const SteadyClock clock;
+  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
+  StatusOr<bench::LayoutStudyResult> result = bench::run_layout_study(settings, progress);
+  if (!result.ok()) return report_failure(result.status());
+  result->command =
+      absl::StrCat(command_line("tessera-bench layouts", settings.common),
+                   " --layouts=", absl::StrJoin(settings.layouts, ","), " --speed=", settings.speed);
+  std::cout << bench::to_text(*result) << std::flush;
+  if (const int code = write_json(settings.common.json, *result); code != kOk) return code;
+  if (settings.common.report.empty()) return kOk;
+  const Status written = bench::write_layout_report(settings.common.report, *result);
+  if (!written.ok()) return report_failure(written);
+  std::cerr << "report: " << settings.common.report << "/layouts.html" << std::endl;
+  return kOk;
+}
+
 int run_report(const std::string& folder) {
   const Status written = bench::write_report(folder);
   if (!written.ok()) return report_failure(written);
@@ -287,6 +310,13 @@ int main(int argc, char** argv) {
   codec->footer(kCodecFooter);
   codec->fallthrough();
 
+  CLI::App* layouts =
+      app.add_subcommand("layouts", "error by samples and bits by error of every atlas layout");
+  bench::LayoutStudySettings layout_settings = bench::default_layout_study_settings();
+  bench::add_options(*layouts, layout_settings);
+  layouts->footer(kLayoutsFooter);
+  layouts->fallthrough();
+
   CLI::App* report = app.add_subcommand("report", "one page from all runs in a folder");
   std::string folder;
   report->add_option("folder", folder, "where `loopback --report` left its runs")
@@ -304,5 +334,6 @@ int main(int argc, char** argv) {
   if (memory->parsed()) return run_memory(memory_settings);
   if (culling->parsed()) return run_culling(culling_settings);
   if (codec->parsed()) return run_codec(codec_settings);
+  if (layouts->parsed()) return run_layouts(layout_settings);
   return spatial->parsed() ? run_spatial(spatial_settings) : run_report(folder);
 }

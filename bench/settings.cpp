@@ -14,8 +14,8 @@ namespace {
 // The one list of options: group, name, field, meaning. Everything else is derived from it.
 template <class Settings, class Visitor>
 void for_each_option(Settings& s, Visitor&& visit) {
-  visit("Input", "scene", s.scene, "glTF file, or gallery[:detail], or city[:triangles]");
-  visit("Input", "path", s.path, "camera path (CSV), or gallery, or city");
+  visit("Input", "scene", s.scene, "glTF file, or gallery[:detail], or city[:triangles], or pipe");
+  visit("Input", "path", s.path, "camera path (CSV), or gallery, or city, or pipe");
   visit("Input", "start", s.start_s, "where on the path to begin, in seconds");
   visit("Input", "seconds", s.seconds, "how long to run");
   visit("Client", "fps", s.fps, "display rate");

@@ -249,6 +249,12 @@ uint64_t ShadingStreamer::violations() const {
 const server::FrameStats& ShadingStreamer::last_stats() const {
   return impl_->stats;
 }
+const Image8& ShadingStreamer::uncoded_atlas() const {
+  return impl_->current().rgb;
+}
+client::Display& ShadingStreamer::display() {
+  return *impl_->display;
+}
 server::Session& ShadingStreamer::session() {
   return *impl_->session;
 }

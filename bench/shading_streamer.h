@@ -52,6 +52,8 @@ class ShadingStreamer final : public Streamer {
   // frame, or an older frame followed a newer one.
   uint64_t violations() const;
   const server::FrameStats& last_stats() const;  // of the last served frame
+  const Image8& uncoded_atlas() const;           // of the current frame; empty without the split
+  client::Display& display();                    // as the last picture left it
   server::Session& session();
 
  private:

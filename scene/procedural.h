@@ -22,10 +22,14 @@ CameraPath gallery_path();
 std::shared_ptr<Scene> make_city(uint64_t triangles);
 CameraPath city_path();
 
-// `spec` is a glTF file's path, or `gallery[:detail]`, or `city[:triangles]`.
+// A pipe of few slanted triangles before a wall, and a sway beside it.
+std::shared_ptr<Scene> make_pipe();
+CameraPath pipe_path();
+
+// `spec` is a glTF file's path, or `gallery[:detail]`, or `city[:triangles]`, or `pipe`.
 StatusOr<std::shared_ptr<Scene>> load_scene(const std::string& spec);
 bool is_procedural(const std::string& spec);  // not a file
-// `spec` is a CSV file's path, or `gallery`, or `city`.
+// `spec` is a CSV file's path, or `gallery`, or `city`, or `pipe`.
 StatusOr<CameraPath> load_path(const std::string& spec);
 
 }  // namespace tessera::scene

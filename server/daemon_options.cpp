@@ -50,7 +50,7 @@ void add_options(CLI::App& app, DaemonSettings& s, LogSettings& log) {
            s.scenes = scenes;
            std::erase(s.scenes, "");
          },
-         "NAME=SOURCE to load at the start; a glTF file, gallery[:detail], city[:triangles]")
+         "NAME=SOURCE to load at the start; a glTF file, gallery[:detail], city[:triangles], pipe")
       ->group("Scenes")
       ->run_callback_for_default()  // so that it is printed like the others
       ->envname("TESSERAD_SCENE");

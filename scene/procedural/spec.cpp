@@ -30,7 +30,7 @@ StatusOr<uint64_t> argument(const std::string& spec, uint64_t otherwise, uint64_
 }  // namespace
 
 bool is_procedural(const std::string& spec) {
-  return names(spec, "gallery") || names(spec, "city");
+  return names(spec, "gallery") || names(spec, "city") || spec == "pipe";
 }
 
 StatusOr<std::shared_ptr<Scene>> load_scene(const std::string& spec) {
@@ -43,12 +43,14 @@ StatusOr<std::shared_ptr<Scene>> load_scene(const std::string& spec) {
                              argument(spec, kDefaultCityTriangles, kMaxCityTriangles));
     return make_city(triangles);
   }
+  if (spec == "pipe") return make_pipe();
   return load_gltf(std::filesystem::path(spec));
 }
 
 StatusOr<CameraPath> load_path(const std::string& spec) {
   if (spec == "gallery") return gallery_path();
   if (spec == "city") return city_path();
+  if (spec == "pipe") return pipe_path();
   return CameraPath::load(spec);
 }
 

@@ -86,7 +86,7 @@ TEST(City, ReachesTheTrianglesAskedFor) {
 }
 
 TEST(Paths, AreSmoothWalksInsideTheirScenes) {
-  for (const std::string name : {"gallery", "city"}) {
+  for (const std::string name : {"gallery", "city", "pipe"}) {
     const auto path = load_path(name);
     ASSERT_TRUE(path.ok());
     const Aabb box = (*load_scene(name == "city" ? "city:200000" : name))->world_bounds(0);
@@ -104,6 +104,18 @@ TEST(Paths, AreSmoothWalksInsideTheirScenes) {
       const double cosine = std::abs(glm::dot(poses[i].pose.orientation, poses[i - 1].pose.orientation));
       EXPECT_LT(2 * std::acos(std::min(cosine, 1.0)) / dt, 2.6);  // rad/s
     }
+  }
+}
+
+TEST(Pipe, IsMadeOfSlantedTriangles) {
+  const auto scene = make_pipe();
+  const Geometry& pipe = scene->geometries[scene->instances[0].geometry];
+  EXPECT_GT(pipe.triangle_count(), 10u);
+  for (uint32_t t = 0; t < pipe.triangle_count(); ++t) {
+    const auto corner = [&](uint32_t c) { return pipe.vertices[pipe.indices[3 * t + c]].position; };
+    const vec3 a = corner(1) - corner(0), b = corner(2) - corner(0), c = b - a;
+    const float longest = std::max({glm::length(a), glm::length(b), glm::length(c)});
+    EXPECT_GT(longest * longest / glm::length(glm::cross(a, b)), 50) << "longest edge over height";
   }
 }
 
