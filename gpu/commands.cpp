@@ -119,9 +119,9 @@ void bind_all(Commands::Impl& impl, const PipelineObjects& pipeline, vk::Pipelin
 bool ready(Commands::Impl& impl, vk::PipelineBindPoint point, const char* call) {
   const bool raster = point == vk::PipelineBindPoint::eGraphics;
   if (impl.pipeline == nullptr || impl.bind_point != point || impl.rendering != raster) {
-    impl.fail(absl::FailedPreconditionError(absl::StrCat(call, ": bind a ", raster ? "raster" : "compute",
-                                                         " pipeline first, ", raster ? "inside" : "outside",
-                                                         " begin_rendering and end_rendering")));
+    impl.fail(absl::FailedPreconditionError(
+        absl::StrCat(call, ": bind a ", raster ? "raster or tessellation" : "compute", " pipeline first, ",
+                     raster ? "inside" : "outside", " begin_rendering and end_rendering")));
   }
   return impl.ok();
 }
@@ -218,6 +218,10 @@ void Commands::bind(const RasterPipeline& pipeline, std::initializer_list<const 
   if (!impl_->ok()) return;
   bind_all(*impl_, pipeline.impl(), vk::PipelineBindPoint::eGraphics, groups);
   set_cull(pipeline.impl().cull);
+}
+
+void Commands::bind(const TessellationPipeline& pipeline, std::initializer_list<const BindGroup*> groups) {
+  if (impl_->ok()) bind_all(*impl_, pipeline.impl(), vk::PipelineBindPoint::eGraphics, groups);
 }
 
 void Commands::set_cull(Cull cull) {
