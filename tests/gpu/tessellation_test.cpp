@@ -5,6 +5,7 @@
 #include "shaders/patch.vert.spv.h"
 #include "shaders/points.tesc.spv.h"
 #include "shaders/points.tese.spv.h"
+#include "shaders/scale.comp.spv.h"
 
 namespace tessera::gpu {
 namespace {
@@ -105,6 +106,34 @@ TEST_F(TessellationTest, PatchesKnowTheirVertexAndStoreIntoImages) {
   const auto marks = read<uint32_t>(marked_, kSide * kSide);
   for (uint32_t i = 0; i < marks.size(); ++i)
     ASSERT_EQ(marks[i], i >= kFirst && i < kFirst + kPatches ? i + 1 : 0) << i;
+}
+
+// One dispatch in the interval, and nothing that would wait for it: the shortest of several runs.
+TEST_F(TessellationTest, AnIntervalAfterwardsHoldsItsDispatch) {
+  constexpr uint32_t kGroups = 1 << 15;
+  const Binding binding{0, BindingKind::storage_buffer};
+  const BindLayout layout = value(BindLayout::create(device(), {&binding, 1}));
+  const auto scale = value(ComputePipeline::create(
+      device(), {.name = "scale", .shader = scale_comp, .layouts = {&layout}, .push_bytes = 4}));
+  const Buffer values = buffer(uint64_t{64} * kGroups * sizeof(uint32_t));
+  BindGroup group = value(BindGroup::create(device(), layout));
+  group.set(0, values);
+  points(4, 4, 1);
+  const auto shortest = [&](uint32_t groups) {
+    double ms = 1e9;
+    for (int i = 0; i < 10; ++i) {
+      Commands commands = device().begin();
+      commands.begin_interval("dispatch");
+      commands.bind(scale, {&group});
+      commands.push(3u);
+      commands.dispatch(groups);
+      commands.end_interval();
+      run(std::move(commands));
+      ms = std::min(ms, device().intervals().front().ms);
+    }
+    return ms;
+  };
+  EXPECT_GT(shortest(kGroups), 10 * shortest(1));
 }
 
 TEST_F(TessellationTest, DrawsOnlyWithinRendering) {
