@@ -115,13 +115,19 @@ void bind_all(Commands::Impl& impl, const PipelineObjects& pipeline, vk::Pipelin
   if (!sets.empty()) impl.cmd().bindDescriptorSets(point, *pipeline.layout, 0, sets, {});
 }
 
+void write_timestamp(Commands::Impl& impl, uint32_t query) {
+  impl.cmd().writeTimestamp2(vk::PipelineStageFlagBits2::eAllCommands, *impl.recorder->queries, query);
+  // lavapipe queues a timestamp that follows a rendering without attachments, and dispatches overtake it.
+  if (impl.core->info.software && !impl.rendering) full_barrier(impl.cmd());
+}
+
 // A dispatch or draw without its pipeline would crash the driver.
 bool ready(Commands::Impl& impl, vk::PipelineBindPoint point, const char* call) {
   const bool raster = point == vk::PipelineBindPoint::eGraphics;
   if (impl.pipeline == nullptr || impl.bind_point != point || impl.rendering != raster) {
-    impl.fail(absl::FailedPreconditionError(absl::StrCat(call, ": bind a ", raster ? "raster" : "compute",
-                                                         " pipeline first, ", raster ? "inside" : "outside",
-                                                         " begin_rendering and end_rendering")));
+    impl.fail(absl::FailedPreconditionError(
+        absl::StrCat(call, ": bind a ", raster ? "raster or tessellation" : "compute", " pipeline first, ",
+                     raster ? "inside" : "outside", " begin_rendering and end_rendering")));
   }
   return impl.ok();
 }
@@ -152,7 +158,7 @@ void Commands::begin_interval(std::string_view name) {
   impl_->in_interval = true;
   names.emplace_back(name);
   const auto query = static_cast<uint32_t>(2 * (names.size() - 1));
-  impl_->cmd().writeTimestamp2(vk::PipelineStageFlagBits2::eAllCommands, *impl_->recorder->queries, query);
+  write_timestamp(*impl_, query);
 }
 
 void Commands::end_interval() {
@@ -160,7 +166,7 @@ void Commands::end_interval() {
   if (!impl_->in_interval) return impl_->fail(absl::FailedPreconditionError("end_interval: none was begun"));
   impl_->in_interval = false;
   const auto query = static_cast<uint32_t>(2 * impl_->recorder->intervals.size() - 1);
-  impl_->cmd().writeTimestamp2(vk::PipelineStageFlagBits2::eAllCommands, *impl_->recorder->queries, query);
+  write_timestamp(*impl_, query);
 }
 
 void Commands::barrier() {
@@ -218,6 +224,10 @@ void Commands::bind(const RasterPipeline& pipeline, std::initializer_list<const 
   if (!impl_->ok()) return;
   bind_all(*impl_, pipeline.impl(), vk::PipelineBindPoint::eGraphics, groups);
   set_cull(pipeline.impl().cull);
+}
+
+void Commands::bind(const TessellationPipeline& pipeline, std::initializer_list<const BindGroup*> groups) {
+  if (impl_->ok()) bind_all(*impl_, pipeline.impl(), vk::PipelineBindPoint::eGraphics, groups);
 }
 
 void Commands::set_cull(Cull cull) {

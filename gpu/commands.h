@@ -54,11 +54,13 @@ class Commands {
   void dispatch(uint32_t x, uint32_t y = 1, uint32_t z = 1);
   void dispatch_indirect(const Buffer& buffer, uint64_t offset);
 
-  // Raster, between begin_rendering and end_rendering. The viewport covers the target (negative height: +Y
-  // up).
+  // Raster and tessellation, between begin_rendering and end_rendering. The viewport covers the target
+  // (negative height: +Y up). Tessellation alone needs no attachments.
   void begin_rendering(const RenderTarget& target);
   void end_rendering();
   void bind(const RasterPipeline& pipeline, std::initializer_list<const BindGroup*> groups);
+  // Of its draws, keep each below about 32,000 points: old lavapipe slows down beyond.
+  void bind(const TessellationPipeline& pipeline, std::initializer_list<const BindGroup*> groups);
   void set_cull(Cull cull);
   void set_viewport(uint32_t x, uint32_t y, uint32_t width, uint32_t height);  // viewport and scissor
   void bind_indices(const Buffer& buffer);                                     // uint32
@@ -71,7 +73,7 @@ class Commands {
   void draw_indexed_indirect_count(const Buffer& buffer, uint64_t offset, const Buffer& count,
                                    uint64_t count_offset, uint32_t max_draws);
 
-  // Both pipeline kinds. `T` is a plain struct of at most 128 bytes.
+  // All kinds of pipeline. `T` is a plain struct of at most 128 bytes.
   template <class T>
   void push(const T& value) {
     push_bytes(std::as_bytes(std::span(&value, 1)));

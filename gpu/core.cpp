@@ -35,7 +35,6 @@ const FeatureRow kFeatures[] = {
     TESSERA_FEATURE(core, drawIndirectFirstInstance, always),
     TESSERA_FEATURE(core, sampleRateShading, always),
     TESSERA_FEATURE(core, depthClamp, always),
-    TESSERA_FEATURE(core, vertexPipelineStoresAndAtomics, always),
     TESSERA_FEATURE(core, fragmentStoresAndAtomics, always),
     TESSERA_FEATURE(core, shaderStorageBufferArrayDynamicIndexing, always),
     TESSERA_FEATURE(core, shaderStorageImageWriteWithoutFormat, always),
@@ -51,6 +50,9 @@ const FeatureRow kFeatures[] = {
     // lavapipe 22.3 does not claim these two, and yet does the first correctly (tests/gpu/compute_test.cpp).
     TESSERA_FEATURE(core, shaderSampledImageArrayDynamicIndexing, on_hardware),
     TESSERA_FEATURE(core, shaderStorageImageArrayDynamicIndexing, on_hardware),
+    // DeviceInfo::tessellation_stores.
+    TESSERA_FEATURE(core, tessellationShader, no),
+    TESSERA_FEATURE(core, vertexPipelineStoresAndAtomics, no),
     // gl_PrimitiveID in fragment shaders counts as geometry shading.
     TESSERA_FEATURE(core, geometryShader, no),
     TESSERA_FEATURE(core, shaderInt64, no),

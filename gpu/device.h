@@ -35,6 +35,7 @@ struct DeviceInfo {
   bool software = false;
   uint64_t max_storage_buffer_range = 0;  // bytes; 128 MiB on old lavapipe
   uint32_t max_sampled_images = 0;        // per stage
+  bool tessellation_stores = false;       // has tessellation shaders, which may store: TessellationPipeline
 };
 
 class DeviceImpl;

@@ -69,6 +69,8 @@ struct RasterPipeline::Impl : PipelineObjects {
   Cull cull = Cull::none;
 };
 
+struct TessellationPipeline::Impl : PipelineObjects {};
+
 constexpr uint32_t kMaxIntervals = 128;  // a submission
 
 // The command buffers and queries of one submission; used again once it is done.

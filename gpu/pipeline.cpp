@@ -115,6 +115,26 @@ vk::raii::Pipeline create_raster(const Core& core, vk::PipelineLayout layout, co
   return core.device.createGraphicsPipeline(nullptr, info);
 }
 
+vk::raii::Pipeline create_tessellation(const Core& core, vk::PipelineLayout layout, const Stages& stages) {
+  const vk::PipelineVertexInputStateCreateInfo no_vertex_buffers;
+  const vk::PipelineInputAssemblyStateCreateInfo patches({}, vk::PrimitiveTopology::ePatchList);
+  const vk::PipelineTessellationStateCreateInfo one_vertex({}, 1);
+  vk::PipelineRasterizationStateCreateInfo rasterization;
+  rasterization.rasterizerDiscardEnable = VK_TRUE;
+  rasterization.lineWidth = 1;
+  const vk::PipelineRenderingCreateInfo no_attachments;
+  // Not used, but a state that is not dynamic would undo what was set for the raster draws that follow.
+  const std::array states = {vk::DynamicState::eViewport, vk::DynamicState::eScissor};
+  const auto dynamic = vk::PipelineDynamicStateCreateInfo().setDynamicStates(states);
+
+  vk::GraphicsPipelineCreateInfo info;
+  info.setPNext(&no_attachments).setStages(stages).setLayout(layout);
+  info.setPVertexInputState(&no_vertex_buffers).setPInputAssemblyState(&patches);
+  info.setPTessellationState(&one_vertex).setPRasterizationState(&rasterization);
+  info.setPDynamicState(&dynamic);
+  return core.device.createGraphicsPipeline(nullptr, info);
+}
+
 }  // namespace
 
 StatusOr<ComputePipeline> ComputePipeline::create(Device& device, const ComputePipelineDesc& desc) {
@@ -165,5 +185,36 @@ RasterPipeline::RasterPipeline() = default;
 RasterPipeline::RasterPipeline(RasterPipeline&&) noexcept = default;
 RasterPipeline& RasterPipeline::operator=(RasterPipeline&&) noexcept = default;
 RasterPipeline::~RasterPipeline() = default;
+
+StatusOr<TessellationPipeline> TessellationPipeline::create(Device& device,
+                                                            const TessellationPipelineDesc& desc) {
+  if (!device.info().tessellation_stores) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("pipeline `", desc.name, "`: the Vulkan device \"", device.info().name,
+                     "\" lacks tessellationShader or vertexPipelineStoresAndAtomics"));
+  }
+  return create_pipeline<TessellationPipeline>(desc, [&]() -> StatusOr<TessellationPipeline> {
+    TessellationPipeline pipeline;
+    pipeline.impl_ = std::make_unique<Impl>();
+    create_layout(*pipeline.impl_, device, desc);
+    const Core& core = *pipeline.impl_->core;
+    const Specialization constants(desc.constants);
+    const vk::raii::ShaderModule vertex = create_module(core, desc.vertex);
+    const vk::raii::ShaderModule control = create_module(core, desc.control);
+    const vk::raii::ShaderModule evaluation = create_module(core, desc.evaluation);
+    using Stage = vk::ShaderStageFlagBits;
+    const Stages stages = {{{}, Stage::eVertex, *vertex, "main", &constants.info},
+                           {{}, Stage::eTessellationControl, *control, "main", &constants.info},
+                           {{}, Stage::eTessellationEvaluation, *evaluation, "main", &constants.info}};
+    pipeline.impl_->pipeline = create_tessellation(core, *pipeline.impl_->layout, stages);
+    core.set_name(*pipeline.impl_->pipeline, desc.name);
+    return pipeline;
+  });
+}
+
+TessellationPipeline::TessellationPipeline() = default;
+TessellationPipeline::TessellationPipeline(TessellationPipeline&&) noexcept = default;
+TessellationPipeline& TessellationPipeline::operator=(TessellationPipeline&&) noexcept = default;
+TessellationPipeline::~TessellationPipeline() = default;
 
 }  // namespace tessera::gpu

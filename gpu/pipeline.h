@@ -1,4 +1,5 @@
-// What a pass binds (BindLayout, BindGroup) and how it runs (ComputePipeline, RasterPipeline).
+// What a pass binds (BindLayout, BindGroup) and how it runs (ComputePipeline, RasterPipeline,
+// TessellationPipeline).
 #pragma once
 
 #include <cstdint>
@@ -122,6 +123,36 @@ class RasterPipeline {
   RasterPipeline(RasterPipeline&&) noexcept;
   RasterPipeline& operator=(RasterPipeline&&) noexcept;
   ~RasterPipeline();
+
+  struct Impl;
+  Impl& impl() const { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+// The tessellator as a generator of work: every vertex of a draw is a patch of its own, the control shader
+// sets its levels, and each point that the tessellator makes of it (point_mode) is an invocation of the
+// evaluation shader, which stores its result into buffers or images. Nothing is rasterised: it writes no
+// gl_Position. gl_PrimitiveID is not to be relied on, since old lavapipe restarts it: pass gl_VertexIndex on.
+struct TessellationPipelineDesc {
+  std::string name;
+  Spirv vertex;
+  Spirv control;
+  Spirv evaluation;
+  std::vector<const BindLayout*> layouts;
+  uint32_t push_bytes = 0;
+  std::vector<Constant> constants;
+};
+
+// FailedPrecondition where DeviceInfo::tessellation_stores is false.
+class TessellationPipeline {
+ public:
+  static StatusOr<TessellationPipeline> create(Device& device, const TessellationPipelineDesc& desc);
+  TessellationPipeline();
+  TessellationPipeline(TessellationPipeline&&) noexcept;
+  TessellationPipeline& operator=(TessellationPipeline&&) noexcept;
+  ~TessellationPipeline();
 
   struct Impl;
   Impl& impl() const { return *impl_; }

@@ -129,11 +129,14 @@ DeviceInfo describe(const vk::raii::PhysicalDevice& device) {
       device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceVulkan12Properties>();
   const vk::PhysicalDeviceProperties& core = chain.get<vk::PhysicalDeviceProperties2>().properties;
   const auto& v12 = chain.get<vk::PhysicalDeviceVulkan12Properties>();
+  const vk::PhysicalDeviceFeatures features = device.getFeatures();
   return {.name = core.deviceName,
           .driver = absl::StrCat(v12.driverName.data(), " ", v12.driverInfo.data()),
           .software = core.deviceType == vk::PhysicalDeviceType::eCpu,
           .max_storage_buffer_range = core.limits.maxStorageBufferRange,
-          .max_sampled_images = core.limits.maxPerStageDescriptorSampledImages};
+          .max_sampled_images = core.limits.maxPerStageDescriptorSampledImages,
+          .tessellation_stores =
+              features.tessellationShader != VK_FALSE && features.vertexPipelineStoresAndAtomics != VK_FALSE};
 }
 
 StatusOr<vk::raii::PhysicalDevice> select_device(const vk::raii::Instance& instance,

@@ -8,7 +8,11 @@
 #include "shading/material_groups.h"
 #include "shading/shaders/gather.comp.spv.h"
 #include "shading/shaders/gather.frag.spv.h"
+#include "shading/shaders/gather.tese.spv.h"
 #include "shading/shaders/gather.vert.spv.h"
+#include "shading/shaders/gather_patch.vert.spv.h"
+#include "shading/shaders/patch.tesc.spv.h"
+#include "shading/tessellator.h"
 
 namespace tessera::shading {
 namespace {
@@ -39,6 +43,7 @@ PassPush pass_of(const View& viewer, const dvec3& origin) {
 uint64_t raster_from_texels(GatherPath path) {
   switch (path) {
     case GatherPath::compute:
+    case GatherPath::tessellation:
       return ~uint64_t{0};
     case GatherPath::raster:
       return 0;
@@ -58,6 +63,7 @@ struct Gather::Impl {
   MaterialGroups groups;
   gpu::ComputePipeline compute;
   gpu::RasterPipeline raster;
+  gpu::TessellationPipeline tessellation;
   gpu::Image image;
   gpu::Buffer blocks, starts, colors;
   uint32_t color_count = 0;
@@ -65,12 +71,16 @@ struct Gather::Impl {
 
   Status create();
   Status create_pipelines();
+  Status create_tessellation(const std::vector<const gpu::BindLayout*>& layouts,
+                             const std::vector<gpu::Constant>& constants);
   Status upload(const GatherWork& work);
   Status fit(uint32_t binding, gpu::Buffer& buffer, uint64_t bytes, gpu::Memory memory);
   void record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, PassPush push,
                       const GatherWork& work);
   void record_raster(gpu::Commands& commands, const scene::SceneInstant& instant, PassPush push,
                      const GatherWork& work);
+  void record_tessellation(gpu::Commands& commands, const scene::SceneInstant& instant, PassPush push,
+                           const GatherWork& work);
 };
 
 Status Gather::Impl::create() {
@@ -106,6 +116,7 @@ Status Gather::Impl::create_pipelines() {
                                                                           .push_bytes = sizeof(PassPush),
                                                                           .constants = constants}));
   if (settings.path == GatherPath::compute) return absl::OkStatus();
+  if (settings.path == GatherPath::tessellation) return create_tessellation(layouts, constants);
   TESSERA_ASSIGN_OR_RETURN(raster, gpu::RasterPipeline::create(device, {.name = "gather raster",
                                                                         .vertex = gather_vert,
                                                                         .fragment = gather_frag,
@@ -113,6 +124,20 @@ Status Gather::Impl::create_pipelines() {
                                                                         .push_bytes = sizeof(PassPush),
                                                                         .constants = constants,
                                                                         .colors = {kAtlasFormat}}));
+  return absl::OkStatus();
+}
+
+Status Gather::Impl::create_tessellation(const std::vector<const gpu::BindLayout*>& layouts,
+                                         const std::vector<gpu::Constant>& constants) {
+  TESSERA_RETURN_IF_ERROR(check_tessellator(device));
+  TESSERA_ASSIGN_OR_RETURN(tessellation,
+                           gpu::TessellationPipeline::create(device, {.name = "gather tessellation",
+                                                                      .vertex = gather_patch_vert,
+                                                                      .control = patch_tesc,
+                                                                      .evaluation = gather_tese,
+                                                                      .layouts = layouts,
+                                                                      .push_bytes = sizeof(PassPush),
+                                                                      .constants = constants}));
   return absl::OkStatus();
 }
 
@@ -130,12 +155,13 @@ Status Gather::Impl::upload(const GatherWork& work) {
   write<BlockRecord>(blocks, work.blocks);
   write<uint32_t>(starts, work.starts);
   color_count = work.colors;
-  stats = {.samples = work.compute_samples + work.raster_samples,
+  stats = {.samples = work.samples,
            .color_samples = work.colors,
            .half_samples = work.half_samples,
            .half_samples_outside = work.half_samples_outside,
            .raster_blocks = work.raster_blocks,
-           .compute_blocks = work.compute_blocks};
+           .compute_blocks = work.compute_blocks,
+           .tessellated_blocks = work.tessellated_blocks};
   return absl::OkStatus();
 }
 
@@ -157,10 +183,23 @@ void Gather::Impl::record_raster(gpu::Commands& commands, const scene::SceneInst
   if (work.raster_batches.empty()) return;
   const gpu::ColorAttachment atlas{.image = &image};
   commands.begin_rendering({.colors = {&atlas, 1}, .width = settings.width, .height = settings.height});
-  for (const RasterBatch& batch : work.raster_batches) {
+  for (const DrawBatch& batch : work.raster_batches) {
     commands.bind(raster, {&scene.group(), &instant.group(), &lighting.group(), &groups.of(batch.material)});
     commands.push(push);
     commands.draw(6, batch.block_count, 0, batch.first_block);
+  }
+  commands.end_rendering();
+}
+
+void Gather::Impl::record_tessellation(gpu::Commands& commands, const scene::SceneInstant& instant,
+                                       PassPush push, const GatherWork& work) {
+  if (work.tessellation_batches.empty()) return;
+  commands.begin_rendering({.width = 1, .height = 1});  // nothing is rasterised
+  for (const DrawBatch& batch : work.tessellation_batches) {
+    commands.bind(tessellation,
+                  {&scene.group(), &instant.group(), &lighting.group(), &groups.of(batch.material)});
+    commands.push(push);
+    commands.draw(batch.block_count, 1, batch.first_block);
   }
   commands.end_rendering();
 }
@@ -179,7 +218,8 @@ StatusOr<std::unique_ptr<Gather>> Gather::create(gpu::Device& device, const scen
 Status Gather::record(gpu::Commands& commands, const scene::SceneInstant& instant, const View& viewer,
                       std::span<const atlas::Placement> placements) {
   const GatherLimits limits{impl_->settings.width, impl_->settings.height,
-                            raster_from_texels(impl_->settings.path)};
+                            raster_from_texels(impl_->settings.path),
+                            impl_->settings.path == GatherPath::tessellation};
   TESSERA_ASSIGN_OR_RETURN(const GatherWork work, build_gather_work(impl_->scene, placements, limits));
   TESSERA_RETURN_IF_ERROR(impl_->upload(work));
   PassPush push = pass_of(viewer, instant.origin());
@@ -188,6 +228,7 @@ Status Gather::record(gpu::Commands& commands, const scene::SceneInstant& instan
   commands.begin_interval("gather");
   impl_->record_compute(commands, instant, push, work);
   impl_->record_raster(commands, instant, push, work);
+  impl_->record_tessellation(commands, instant, push, work);
   commands.barrier();
   commands.end_interval();
   return absl::OkStatus();

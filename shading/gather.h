@@ -1,5 +1,5 @@
-// Shades the samples of placed patches into the atlas image (the gather). Two paths with the same result:
-// raster rectangles for large blocks, compute for small ones.
+// Shades the samples of placed patches into the atlas image (the gather). Three paths with the same result:
+// raster rectangles for large blocks, compute for small ones, and the tessellation stages.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,10 @@
 
 namespace tessera::shading {
 
-enum class GatherPath { automatic, compute, raster };
+// Single colours are computed on every path. `tessellation` shades Ls and halves in the evaluation shader,
+// one invocation for each vertex of a tessellated triangle (TSS section 3), and computes blocks; it needs a
+// device that passes check_tessellator() (tessellator.h). `automatic` does not choose it.
+enum class GatherPath { automatic, compute, raster, tessellation };
 
 struct GatherSettings {
   uint32_t width = 2048, height = 1024;     // of the atlas
@@ -21,11 +24,12 @@ struct GatherSettings {
 };
 
 struct GatherStats {
-  uint64_t samples = 0;               // shaded
+  uint64_t samples = 0;               // filled; what lies twice in an L is shaded once by tessellation
   uint64_t color_samples = 0;         // single colours among them
   uint64_t half_samples = 0;          // of halves (Oversampling) among them
   uint64_t half_samples_outside = 0;  // and of those, outside their triangles
   uint64_t raster_blocks = 0, compute_blocks = 0;
+  uint64_t tessellated_blocks = 0;  // triangles that went to the tessellator
   double gpu_ms = 0;
 };
 
@@ -33,6 +37,7 @@ struct GatherStats {
 // keep the colour that they had (a still image costs a video coder nothing), mid-grey at first.
 class Gather {
  public:
+  // FailedPrecondition where the path is tessellation and the device cannot do it.
   static StatusOr<std::unique_ptr<Gather>> create(gpu::Device& device, const scene::GpuScene& scene,
                                                   const Lighting& lighting, const GatherSettings& settings);
   ~Gather();

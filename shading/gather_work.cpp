@@ -1,6 +1,8 @@
 #include "shading/gather_work.h"
 
 #include "atlas/addressing/addressing.h"
+#include "shading/gather.h"
+#include "shading/tessellator.h"
 
 namespace tessera::shading {
 namespace {
@@ -8,7 +10,7 @@ namespace {
 struct Item {
   BlockRecord record;
   uint32_t material;
-  bool raster;
+  GatherPath path;  // not automatic
 };
 
 using atlas::Placement;
@@ -36,6 +38,15 @@ uint64_t item_samples(const BlockRecord& r) {
            (r.shape & kBlockMasked ? 2 : 1);
   if (r.shape & kBlockHalf) return static_cast<uint64_t>(addressing::staircase_samples(stairs_of(r)));
   return uint64_t{r.size & 0xffff} * (r.size >> 16);
+}
+
+// Of a record of the tessellation path.
+uint32_t item_points(const BlockRecord& r) {
+  if (r.shape & kBlockL)
+    return static_cast<uint32_t>(addressing::tessellation_vertices(static_cast<int>(r.size & 0x7f)));
+  const int samples = addressing::staircase_samples(stairs_of(r));
+  return std::min(static_cast<uint32_t>(addressing::oversampling_part(samples)),
+                  static_cast<uint32_t>(samples) - r.first_sample);
 }
 
 // Beyond the staircase's third side. Every row begins inside.
@@ -97,7 +108,7 @@ void add_compute(GatherWork& work, std::span<const Item> items, std::span<const 
   uint64_t next = 0;  // sample
   uint32_t material = ~0u;
   for (uint32_t i : order) {
-    if (items[i].raster) continue;
+    if (items[i].path != GatherPath::compute) continue;
     if (items[i].material != material) {
       next = work.starts.size() * kChunkSamples;
       const auto chunk = static_cast<uint32_t>(work.starts.size());
@@ -113,7 +124,6 @@ void add_compute(GatherWork& work, std::span<const Item> items, std::span<const 
     while (work.starts.size() * kChunkSamples < next) work.starts.push_back(index);
     work.compute_batches.back().end_chunk = static_cast<uint32_t>(work.starts.size());
     work.blocks.push_back(block);
-    work.compute_samples += samples;
     if (!(block.shape & kBlockColor)) ++work.compute_blocks;
   }
   work.blocks.push_back({.first_sample = ~0u});
@@ -122,13 +132,29 @@ void add_compute(GatherWork& work, std::span<const Item> items, std::span<const 
 void add_raster(GatherWork& work, std::span<const Item> items, std::span<const uint32_t> order) {
   uint32_t material = ~0u;
   for (uint32_t i : order) {
-    if (!items[i].raster) continue;
+    if (items[i].path != GatherPath::raster) continue;
     if (items[i].material != material)
       work.raster_batches.push_back({items[i].material, static_cast<uint32_t>(work.blocks.size()), 0});
     material = items[i].material;
     ++work.raster_batches.back().block_count;
     ++work.raster_blocks;
-    work.raster_samples += item_samples(items[i].record);
+    work.blocks.push_back(items[i].record);
+  }
+}
+
+void add_tessellation(GatherWork& work, std::span<const Item> items, std::span<const uint32_t> order) {
+  uint32_t material = ~0u, points = 0;  // of the last batch
+  for (uint32_t i : order) {
+    if (items[i].path != GatherPath::tessellation) continue;
+    const uint32_t more = item_points(items[i].record);
+    if (items[i].material != material || points + more > kMaxPointsADraw) {
+      work.tessellation_batches.push_back({items[i].material, static_cast<uint32_t>(work.blocks.size()), 0});
+      points = 0;
+    }
+    material = items[i].material;
+    points += more;
+    ++work.tessellation_batches.back().block_count;
+    ++work.tessellated_blocks;
     work.blocks.push_back(items[i].record);
   }
 }
@@ -148,7 +174,8 @@ class Items {
         first.place = work_.colors++;
         first.size = packed(1, 1);
         first.shape |= kBlockColor;
-        items_.push_back({first, material, false});
+        items_.push_back({first, material, GatherPath::compute});
+        ++work_.samples;
         return absl::OkStatus();
       case PlacementKind::block:
         first.size = packed(p.width, p.height);
@@ -212,8 +239,27 @@ class Items {
   Status add_one(BlockRecord record, uint32_t x, uint32_t y, uint32_t width, uint32_t height) {
     TESSERA_RETURN_IF_ERROR(check_rectangle(x, y, width, height, limits_));
     record.place = packed(x, y);
-    items_.push_back({record, material_, item_samples(record) >= limits_.raster_from_texels});
+    work_.samples += item_samples(record);
+    if (limits_.tessellate && (record.shape & (kBlockL | kBlockHalf)))
+      add_triangles(record);
+    else
+      items_.push_back(
+          {record, material_,
+           item_samples(record) >= limits_.raster_from_texels ? GatherPath::raster : GatherPath::compute});
     return absl::OkStatus();
+  }
+
+  // What the tessellator takes for a record: see GatherWork::blocks.
+  void add_triangles(BlockRecord record) {
+    const auto samples = static_cast<uint32_t>(item_samples(record));
+    const auto add = [&] { items_.push_back({record, material_, GatherPath::tessellation}); };
+    if (record.shape & kBlockL) {
+      add();
+      record.shape |= kBlockTurned;
+      if (record.shape & kBlockMasked) add();
+      return;
+    }
+    for (; record.first_sample < samples; record.first_sample += item_points(record)) add();
   }
 
   const GatherLimits& limits_;
@@ -249,6 +295,7 @@ StatusOr<GatherWork> build_gather_work(const scene::GpuScene& gpu_scene,
   const std::vector<uint32_t> order = order_by_material(items.items(), scene.materials.size());
   add_compute(work, items.items(), order);
   add_raster(work, items.items(), order);
+  add_tessellation(work, items.items(), order);
   return work;
 }
 

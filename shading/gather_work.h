@@ -22,7 +22,7 @@ struct BlockRecord {
   uint32_t size;
   uint32_t shape;         // triangle count, 1 of an L and a half | flags
   uint32_t spacing;       // codes of corners 1..4, least significant byte first (atlas::Placement)
-  uint32_t first_sample;  // compute path
+  uint32_t first_sample;  // compute path: of all; tessellation path: of its part of a half
 };
 static_assert(sizeof(BlockRecord) == 28);
 constexpr uint32_t kBlockTransposed = 1u << 2, kBlockMasked = 1u << 3, kBlockColor = 1u << 4,
@@ -30,8 +30,8 @@ constexpr uint32_t kBlockTransposed = 1u << 2, kBlockMasked = 1u << 3, kBlockCol
 
 constexpr uint32_t kChunkSamples = 64;  // local size of gather.comp
 
-// Work of one material: one draw (raster) or dispatch (compute).
-struct RasterBatch {
+// Work of one material: one draw (raster), some (tessellation) or one dispatch (compute).
+struct DrawBatch {
   uint32_t material, first_block, block_count;
 };
 struct ComputeBatch {
@@ -39,19 +39,22 @@ struct ComputeBatch {
 };
 
 struct GatherWork {
-  // Compute blocks, a sentinel that no sample reaches, then raster blocks.
+  // Compute blocks, a sentinel that no sample reaches, raster blocks, then those to tessellate: a masked L
+  // twice (for its coverage with kBlockTurned), a half in parts of oversampling_part() samples.
   std::vector<BlockRecord> blocks;
   std::vector<uint32_t> starts;  // by chunk of kChunkSamples samples of one material: its first block
   std::vector<ComputeBatch> compute_batches;
-  std::vector<RasterBatch> raster_batches;
-  uint64_t compute_samples = 0, raster_samples = 0;     // shaded, without padding
+  std::vector<DrawBatch> raster_batches;
+  std::vector<DrawBatch> tessellation_batches;          // each at most kMaxPointsADraw points
+  uint64_t samples = 0;                                 // without padding, as Placement::texels()
   uint64_t half_samples = 0, half_samples_outside = 0;  // of halves; outside their triangles
-  uint32_t colors = 0, compute_blocks = 0, raster_blocks = 0;
+  uint32_t colors = 0, compute_blocks = 0, raster_blocks = 0, tessellated_blocks = 0;
 };
 
 struct GatherLimits {
   uint32_t width, height;       // of the atlas
   uint64_t raster_from_texels;  // blocks of at least so many texels go to the raster path
+  bool tessellate;              // Ls and halves go to the tessellation path
 };
 
 // InvalidArgument if a placement names no patch of the scene or leaves the atlas.

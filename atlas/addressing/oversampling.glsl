@@ -25,6 +25,13 @@ INLINE int oversampling_id(vec3 lambda, TessellationLevels levels) {
   return tessellation_vertices(length - 2) + side * length + steps[(side + 1) % 3];
 }
 
+// More samples than a triangle can have are those of several triangles: so many of each but the last, which has fewer, though
+// never under 3 (of up to 200,000).
+INLINE int oversampling_part(int samples) {
+  int parts = (samples + kMaxTessellationVertices - 1) / kMaxTessellationVertices;
+  return (samples + parts - 1) / parts;
+}
+
 // The block of samples of the triangle (0, 0), (size.x, 0), (0, size.y), in steps between samples; 1 <= size.x <= size.y,
 // size.x <= 128, size.y <= 1024: sizes up to which the functions below are checked. Every bilinear footprint of the triangle
 // lies in it. Row 0 has size.x + 1 samples, each stretch of staircase_stretch() rows below it one sample less than the one above.

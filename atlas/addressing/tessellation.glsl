@@ -20,6 +20,13 @@ struct TessellationLevels {
   int inner;
 };
 
+INLINE TessellationLevels uniform_levels(int level) {
+  TessellationLevels levels;
+  levels.outer = ivec3(level);
+  levels.inner = level;
+  return levels;
+}
+
 // The smallest levels that make exactly `count` vertices, 3 <= count <= 3169, their outer levels as even as can be. Stands in
 // for TSS-supp eqs. 2-6, which as printed give another count almost always. No outer level is 0: that would cull the triangle.
 INLINE TessellationLevels tessellation_levels(int count) {

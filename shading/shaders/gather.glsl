@@ -18,7 +18,7 @@ struct Block {
   uint size;
   uint shape;           // triangle count, 1 of an L and a half | flags
   uint spacing;         // codes of corners 1..4
-  uint first_sample;    // compute path: of the whole dispatch
+  uint first_sample;    // compute path: of the whole dispatch; tessellation path: of the half, where this part of it begins
 };
 const uint kBlockTransposed = 1u << 2, kBlockMasked = 1u << 3, kBlockColor = 1u << 4, kBlockL = 1u << 5, kBlockHalf = 1u << 6,
            kBlockTurned = 1u << 7;

@@ -104,6 +104,13 @@ std::shared_ptr<scene::Scene> SceneBuilder::build() {
   return scene_;
 }
 
+scene::Material wavy(SceneBuilder& b, bool half_cut) {
+  scene::Material m{.metallic = 0.3f, .roughness = 0.4f, .double_sided = true};
+  m.base_color_texture.texture = b.texture(wavy_texture(64, half_cut));
+  if (half_cut) m.alpha_mode = scene::AlphaMode::mask;
+  return m;
+}
+
 scene::Texture wavy_texture(uint32_t side, bool half_cut) {
   scene::Texture t;
   t.width = t.height = side;

@@ -34,6 +34,9 @@ class SceneBuilder {
   std::shared_ptr<scene::Scene> scene_;
 };
 
+// Lit, two-sided, with a wavy texture; masked where that has a cut.
+scene::Material wavy(SceneBuilder& b, bool half_cut);
+
 // A white-noise-like but smooth RGB texture; alpha 0 in the left half if `half_cut`.
 scene::Texture wavy_texture(uint32_t side, bool half_cut);
 

@@ -69,6 +69,18 @@ ReferenceImage render(const World& world, const View& view, const ReferenceReque
   return value(renderer->render(*world.instant, view, request));
 }
 
+atlas::Placement block(scene::PatchId patch, uint32_t x, uint32_t y, uint8_t log_w, uint8_t log_h,
+                       bool transposed, bool masked) {
+  return {.patch = patch,
+          .kind = atlas::PlacementKind::block,
+          .x = static_cast<uint16_t>(x),
+          .y = static_cast<uint16_t>(y),
+          .width = static_cast<uint16_t>(1u << log_w),
+          .height = static_cast<uint16_t>(1u << log_h),
+          .transposed = transposed,
+          .masked = masked};
+}
+
 GatherResult gather(const World& world, const dvec3& eye, std::span<const atlas::Placement> placements,
                     const GatherSettings& settings) {
   const auto gather = value(Gather::create(device(), *world.gpu_scene, *world.lighting, settings));

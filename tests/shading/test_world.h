@@ -32,6 +32,10 @@ View look(const dvec3& eye, const dvec3& target, uint32_t side = 32);
 
 ReferenceImage render(const World& world, const View& view, const ReferenceRequest& request = {});
 
+// A block of 2^log_w x 2^log_h texels.
+atlas::Placement block(scene::PatchId patch, uint32_t x, uint32_t y, uint8_t log_w, uint8_t log_h,
+                       bool transposed = false, bool masked = false);
+
 struct GatherResult {
   Image8 atlas;
   std::vector<uint32_t> colors;

@@ -12,13 +12,6 @@ namespace tessera::atlas::addressing::test {
 // Equal spacing. Not for an inside of 1 with outer levels above, which the tessellator takes for 2.
 std::vector<vec3> tessellated(const TessellationLevels& levels);
 
-inline TessellationLevels uniform_levels(int level) {
-  TessellationLevels levels;
-  levels.outer = ivec3(level);
-  levels.inner = level;
-  return levels;
-}
-
 // How far gl_TessCoord times the level was found from a whole number.
 constexpr float kTessCoordError = 0.0103f;
 
