@@ -142,16 +142,30 @@ TEST_F(CoherentLayout, AFullAtlasFallsBackToColorsAndRecovers) {
   EXPECT_EQ(layout_->stats().colors_out_of_memory, 0u);
 }
 
-TEST(Rectangles, SamplesAreEquallyDenseWhateverTheShape) {
+TEST(Rectangles, HaveTheTexelsOfTheirNeedWhateverTheShape) {
   for (float u = 8; u <= 200; u *= 1.13f) {
     for (float v = 8; v <= 200; v *= 1.17f) {
       const RectangleNeed need = rectangle_need({u, v, u * v}, 2);
       const RectangleSize size = select_size(need, false, 0, nullptr, {});
-      // Intervals a pixel, both ways together.
-      const float density = float(size.u - 1) * float(size.v - 1) / (u * v);
-      EXPECT_NEAR(std::log2(density), 0, 0.45f) << u << "x" << v;
+      EXPECT_NEAR(std::log2(float(size.u) * float(size.v) / (u * v)), 0, 0.45f) << u << "x" << v;
+      EXPECT_NEAR(std::log2(float(size.u) / float(size.v) * v / u), 0, 0.75f) << u << "x" << v;
       EXPECT_EQ(sides_of(size, false).x, std::min(size.u, size.v));
       EXPECT_EQ(sides_of(size, true).y, 2 * std::max(size.u, size.v));
+    }
+  }
+}
+
+// A quarter of a pixel high, they once held ten times the texels of what they show.
+TEST(Rectangles, SliversPayForTheirWidthWithTheirLength) {
+  for (float height = 0.02f; height < 2; height *= 1.3f) {
+    for (float length = 8; length <= 250; length *= 1.3f) {
+      for (const bool upright : {false, true}) {
+        const scene::Footprint sliver{upright ? height : length, upright ? length : height, length * height};
+        const RectangleNeed need = rectangle_need(sliver, 2);
+        const RectangleSize size = select_size(need, false, 0, nullptr, {});
+        if (size.single_color()) continue;
+        EXPECT_LE(size.u * size.v, std::max(4.0f, need.area + 2)) << length << "x" << height;
+      }
     }
   }
 }
