@@ -85,7 +85,7 @@ UniqueTexture::Chart UniqueTexture::pack(std::span<const PatchSize> sizes, doubl
   double area = 0;
   uint32_t widest = 0;
   for (size_t i = 0; i < sizes.size(); ++i) {
-    Rectangle& r = chart.patches[i];
+    TexelRectangle& r = chart.patches[i];
     r = {0, 0, side_of(sizes[i].u_m, texels_per_metre), side_of(sizes[i].v_m, texels_per_metre)};
     area += double{1} * r.width * r.height;
     widest = std::max(widest, r.width);
@@ -97,7 +97,7 @@ UniqueTexture::Chart UniqueTexture::pack(std::span<const PatchSize> sizes, doubl
                            [&](uint32_t patch) { return chart.patches[patch].height; });
   uint32_t x = 0;
   for (uint32_t i = 0; i < chart.by_place.size(); ++i) {
-    Rectangle& r = chart.patches[chart.by_place[i]];
+    TexelRectangle& r = chart.patches[chart.by_place[i]];
     if (chart.rows.empty() || x + r.width > chart.width) {
       const uint32_t y = chart.rows.empty() ? 0 : chart.rows.back().y + chart.rows.back().height;
       chart.rows.push_back({y, r.height, i, i});
@@ -172,7 +172,7 @@ TexelPoint UniqueTexture::texel(uint32_t instance, uint32_t level, uvec2 texel) 
       std::upper_bound(begin, end, x, [&](uint32_t at, uint32_t p) { return at < chart.patches[p].x; });
   if (after == begin) return {};
   const uint32_t patch = *(after - 1);
-  const Rectangle& r = chart.patches[patch];
+  const TexelRectangle& r = chart.patches[patch];
   if (x >= r.x + r.width || y >= r.y + r.height) return {};
   const vec2 extent(static_cast<float>(r.width - 1), static_cast<float>(r.height - 1));
   return {patch, glm::clamp(centre - vec2(r.x, r.y), vec2(0), extent), extent};
@@ -186,7 +186,7 @@ TexelLookup UniqueTexture::lookup(uint32_t triangle, const View& view, uvec2 pix
   const scene::Geometry& geometry = scene_->geometries[instance.geometry];
   const uint32_t in_geometry = triangle - instance.first_triangle;
   const scene::Patch& patch = geometry.patches[patch_id - instance.first_patch];
-  const Rectangle& r = charts_[i].patches[patch_id - instance.first_patch];
+  const TexelRectangle& r = charts_[i].patches[patch_id - instance.first_patch];
   const vec2 extent(static_cast<float>(r.width - 1), static_cast<float>(r.height - 1));
   std::array<dvec3, 3> corners;
   std::array<dvec2, 3> texels;

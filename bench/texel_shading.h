@@ -47,6 +47,11 @@ struct TexelPoint {
   vec2 extent{1};                 // of the patch, from its first corner to the far one
 };
 
+// Where a patch lies in level 0 of its instance's texture.
+struct TexelRectangle {
+  uint32_t x = 0, y = 0, width = 0, height = 0;
+};
+
 // Immutable. `transforms`: world matrix of each instance.
 class UniqueTexture {
  public:
@@ -59,6 +64,8 @@ class UniqueTexture {
   double texels_per_metre() const;  // of level 0
   uint32_t levels(uint32_t instance) const;
   uvec2 size(uint32_t instance, uint32_t level) const;  // texels
+  // By patch of the instance's geometry.
+  std::span<const TexelRectangle> patches(uint32_t instance) const { return charts_[instance].patches; }
   TexelPoint texel(uint32_t instance, uint32_t level, uvec2 texel) const;
 
   // By the triangle that the pixel (x, y from the upper left) shows, an instanced one (scene::Instance). The
@@ -74,9 +81,6 @@ class UniqueTexture {
   uint32_t samples(const TexelTile& tile) const;
 
  private:
-  struct Rectangle {
-    uint32_t x, y, width, height;
-  };
   struct Row {
     uint32_t y, height;
     uint32_t begin, end;  // in Chart::by_place
@@ -84,7 +88,7 @@ class UniqueTexture {
   // The texture of an instance.
   struct Chart {
     uint32_t width = 0, height = 0;
-    std::vector<Rectangle> patches;
+    std::vector<TexelRectangle> patches;
     std::vector<uint32_t> by_place;  // patches row by row, left to right
     std::vector<Row> rows;
   };

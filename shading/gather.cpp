@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "shading/features.h"
+#include "shading/gather_pass.h"
 #include "shading/gather_work.h"
 #include "shading/growing_buffer.h"
 #include "shading/material_groups.h"
@@ -23,22 +24,6 @@ constexpr std::array<float, 4> kMidGrey{0.2158605f, 0.2158605f, 0.2158605f, 0};
 constexpr uint32_t kMaxGroupsX = 32768;  // Vulkan guarantees 65535
 
 enum GatherBinding : uint32_t { kBlocks = 1, kStarts, kColors, kAtlas };
-
-// Pass in shading/shaders/gather.glsl.
-struct PassPush {
-  vec4 eye, axis, ray_x, ray_y;
-  uint32_t width, height;
-  uint32_t first_chunk, end_chunk;
-};
-
-PassPush pass_of(const View& viewer, const dvec3& origin) {
-  const glm::dmat3 axes = glm::mat3_cast(viewer.pose.orientation);
-  const Fov& fov = viewer.fov;
-  return {.eye = vec4(vec3(viewer.pose.position - origin), 1),
-          .axis = vec4(vec3(-axes[2]), 0),
-          .ray_x = vec4(vec3(axes[0]) * ((fov.right - fov.left) / static_cast<float>(viewer.width)), 0),
-          .ray_y = vec4(vec3(axes[1]) * ((fov.up - fov.down) / static_cast<float>(viewer.height)), 0)};
-}
 
 uint64_t raster_from_texels(GatherPath path) {
   switch (path) {
