@@ -9,6 +9,7 @@
 namespace tessera::bench {
 namespace {
 
+using glm::dvec2;
 namespace addressing = atlas::addressing;
 
 constexpr uint32_t kMaxPatchSide = 8192;  // texels
