@@ -162,7 +162,7 @@ Status Study::add_load(GatherRow row, std::vector<Placement> placements) {
   if (stats.half_samples > 0)
     row.outside = static_cast<double>(stats.half_samples_outside) / static_cast<double>(stats.half_samples);
   std::vector<GatherPath> paths(std::begin(shading::kGatherPaths), std::end(shading::kGatherPaths));
-  paths.push_back(GatherPath::automatic);
+  if (row.group == "layouts") paths.push_back(GatherPath::automatic);  // others have one shape and size
   for (const GatherPath path : paths) {
     row.path = name_of(path);
     cases_.push_back({.row = row, .shade = [this, load, path] { return gather(*load, path); }});
@@ -266,29 +266,40 @@ Status Study::add_texels() {
   return absl::OkStatus();
 }
 
-// A forward picture before each load, so that what drifts on the machine drifts for both.
+// A forward picture before and after each load: ratios are to the mean of the two, so that what drifts on the
+// machine drifts for both.
 Status Study::measure_round(bool counts) {
-  ForwardTime forward_time;
+  std::vector<double> case_ms;
+  std::vector<ForwardTime> before;  // each load, and after the last
+  std::vector<size_t> load_of;
+  const auto look_forward = [&]() -> Status {
+    TESSERA_ASSIGN_OR_RETURN(before.emplace_back(), forward());
+    return absl::OkStatus();
+  };
+  for (size_t i = 0; i < cases_.size(); ++i) {
+    const GatherRow& row = cases_[i].row;
+    const bool new_load =
+        i == 0 || row.group != cases_[i - 1].row.group || row.name != cases_[i - 1].row.name;
+    if (new_load) TESSERA_RETURN_IF_ERROR(look_forward());
+    load_of.push_back(before.size() - 1);
+    TESSERA_ASSIGN_OR_RETURN(case_ms.emplace_back(), cases_[i].shade());
+    progress_.advance();
+  }
+  TESSERA_RETURN_IF_ERROR(look_forward());
+  if (!counts) return absl::OkStatus();
+  const double per_pixel = 1e6 / static_cast<double>(covered_);
+  for (const ForwardTime& time : before) {
+    forward_ns_.push_back((time.depth_ms + time.shading_ms) * per_pixel);
+    shading_ns_.push_back(time.shading_ms * per_pixel);
+  }
+  const size_t first = forward_ns_.size() - before.size();
   for (size_t i = 0; i < cases_.size(); ++i) {
     Case& c = cases_[i];
-    const bool same_load =
-        i > 0 && c.row.group == cases_[i - 1].row.group && c.row.name == cases_[i - 1].row.name;
-    if (!same_load) {
-      TESSERA_ASSIGN_OR_RETURN(forward_time, forward());
-    }
-    TESSERA_ASSIGN_OR_RETURN(const double ms, c.shade());
-    progress_.advance();
-    if (!counts) continue;
-    const double per_pixel = 1e6 / static_cast<double>(covered_);
-    const double shading_ns = forward_time.shading_ms * per_pixel;
-    const double forward_ns = shading_ns + forward_time.depth_ms * per_pixel;
-    const double ns = 1e6 * ms / static_cast<double>(std::max<uint64_t>(1, c.row.samples));
+    const size_t at = first + load_of[i];
+    const double ns = 1e6 * case_ms[i] / static_cast<double>(std::max<uint64_t>(1, c.row.samples));
     c.ns.push_back(ns);
-    c.ratio.push_back(ns / forward_ns);
-    c.ratio_shading.push_back(ns / shading_ns);
-    if (same_load) continue;
-    forward_ns_.push_back(forward_ns);
-    shading_ns_.push_back(shading_ns);
+    c.ratio.push_back(2 * ns / (forward_ns_[at] + forward_ns_[at + 1]));
+    c.ratio_shading.push_back(2 * ns / (shading_ns_[at] + shading_ns_[at + 1]));
   }
   return absl::OkStatus();
 }

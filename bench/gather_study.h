@@ -37,13 +37,13 @@ struct Spread {
 Spread spread_of(std::vector<double> values);
 
 struct GatherRow {
-  std::string group, name;        // "blocks", "16x16"
-  std::string path;               // name_of(GatherPath), or "compute" of texel shading
-  double size = 0;                // side, level, or intervals across
-  double slant = 0;               // halves: base to height
-  uint64_t samples = 0;           // shaded
-  Spread ns;                      // a sample
-  Spread ratio;                   // to forward shading, depth and shading pass, in the same round
+  std::string group, name;  // "blocks", "16x16"
+  std::string path;         // name_of(GatherPath), or "compute" of texel shading
+  double size = 0;          // side, level, or intervals across
+  double slant = 0;         // halves: base to height
+  uint64_t samples = 0;     // shaded
+  Spread ns;                // a sample
+  Spread ratio;  // to forward shading, depth and shading pass, in the same round, just before and after
   Spread ratio_shading;           // to its shading pass alone
   std::optional<double> outside;  // halves: share of the samples outside their triangles
   std::optional<double> empty;    // texel shading: share of its tiles' texels that show nothing

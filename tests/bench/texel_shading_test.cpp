@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "bench/texel_shader.h"
 #include "scene/procedural.h"
+#include "server/shared_scene.h"
+#include "shading/gather.h"
 
 namespace tessera::bench {
 namespace {
@@ -121,6 +124,67 @@ TEST(UniqueTexture, TilesOfAPictureAreThoseThatItReads) {
   // A quarter of the square is seen, so at most about a quarter of the tiles and the border.
   const uvec2 all = (texture->size(0, tiles[0].level) + 7u) / 8u;
   EXPECT_LT(tiles.size(), all.x * all.y / 2);
+}
+
+// A texel of the finest level shows what a block of that size shows there.
+TEST(TexelShader, AgreesWithTheGather) {
+  auto device = gpu::Device::create({.select = "cpu"});
+  ASSERT_TRUE(device.ok()) << device.status();
+  auto lit = std::make_shared<scene::Scene>(square());
+  lit->lights = {{.type = scene::LightType::point, .intensity = 5, .node = 1}};
+  lit->nodes.push_back({.translation = {0.3, 0.4, 1}});
+  lit->index_instances();
+  const auto shared = server::SharedScene::create(*device, lit);
+  ASSERT_TRUE(shared.ok()) << shared.status();
+  const auto instant = scene::SceneInstant::create(**device, (*shared)->gpu_scene());
+  ASSERT_TRUE(instant.ok()) << instant.status();
+  (*instant)->set(0, {});
+  ASSERT_TRUE((*shared)->lighting().update(**instant).ok());
+  const View view = view_from(2, 1 << 16);
+
+  const auto texture = UniqueTexture::create(*lit, transforms_of(*lit), 64 * 64);
+  ASSERT_TRUE(texture.ok()) << texture.status();
+  const TexelRectangle r = texture->patches(0)[0];
+  const auto shader = TexelShader::create(**device, (*shared)->gpu_scene(), (*shared)->lighting(), *texture);
+  ASSERT_TRUE(shader.ok()) << shader.status();
+  std::vector<TexelTile> tiles;
+  for (uint32_t y = 0; y < texture->size(0, 0).y / kTexelTile; ++y)
+    for (uint32_t x = 0; x < texture->size(0, 0).x / kTexelTile; ++x) tiles.push_back({0, 0, x, y});
+  const auto shaded = (*shader)->shade(**instant, view, tiles);
+  ASSERT_TRUE(shaded.ok()) << shaded.status();
+  EXPECT_EQ(shaded->samples, r.width * r.height);
+  EXPECT_GT(shaded->gpu_ms, 0);
+
+  const auto gather = shading::Gather::create(**device, (*shared)->gpu_scene(), (*shared)->lighting(),
+                                              {.width = 128, .height = 128});
+  ASSERT_TRUE(gather.ok()) << gather.status();
+  const atlas::Placement block{.patch = 0,
+                               .kind = atlas::PlacementKind::block,
+                               .width = static_cast<uint16_t>(r.width),
+                               .height = static_cast<uint16_t>(r.height)};
+  auto readback = gpu::Buffer::create(**device, 4 * 128 * 128, gpu::Memory::readback, "test atlas");
+  ASSERT_TRUE(readback.ok()) << readback.status();
+  gpu::Commands commands = (*device)->begin();
+  ASSERT_TRUE((*gather)->record(commands, **instant, view, {&block, 1}).ok());
+  commands.copy_to_buffer((*gather)->image(), *readback);
+  commands.barrier();
+  ASSERT_TRUE((*device)->run(std::move(commands)).ok());
+  const auto atlas = readback->as<const uint8_t>();
+  int brightest = 0;
+  for (size_t t = 0; t < tiles.size(); ++t)
+    for (uint32_t i = 0; i < kTexelTileTexels; ++i) {
+      const uint32_t x = tiles[t].x * kTexelTile + i % kTexelTile,
+                     y = tiles[t].y * kTexelTile + i / kTexelTile;
+      const uint32_t color = shaded->colors[t * kTexelTileTexels + i];
+      const bool inside = x < r.width && y < r.height;
+      EXPECT_EQ(color >> 24, inside ? 255u : 0u) << x << "," << y;
+      for (int c = 0; c < 3 && inside; ++c) {
+        const int texel = static_cast<int>(color >> (8 * c) & 0xff);
+        EXPECT_NEAR(texel, atlas[4 * (128 * y + x) + static_cast<size_t>(c)], 1) << x << "," << y;
+        brightest = std::max(brightest, texel);
+      }
+    }
+  EXPECT_GT(brightest, 100);
 }
 
 }  // namespace
