@@ -98,9 +98,12 @@ Status check(const DaemonSettings& settings) {
   TESSERA_RETURN_IF_ERROR(stream_settings(settings).status());
   TESSERA_RETURN_IF_ERROR(control_token(settings).status());
   for (const std::string& scene : settings.scenes) TESSERA_RETURN_IF_ERROR(name_and_source(scene).status());
-  if (!shading::gather_path_named(settings.gather))
-    return absl::InvalidArgumentError(absl::StrCat("--gather ", settings.gather, ": must be one of ",
-                                                   absl::StrJoin(shading::kGatherPathNames, ", ")));
+  if (!shading::gather_path_named(settings.gather)) {
+    const std::vector<std::string> names(std::begin(shading::kGatherPathNames),
+                                         std::end(shading::kGatherPathNames));
+    return absl::InvalidArgumentError(
+        absl::StrCat("--gather ", settings.gather, ": must be one of ", absl::StrJoin(names, ", ")));
+  }
   return absl::OkStatus();
 }
 

@@ -45,11 +45,12 @@ GatherChoice cheapest(const GatherCosts& costs) {
   return choice;
 }
 
+// Raster wins where it shades no texel in vain. An L's or a half's rectangle also has others', and many small
+// rectangles cost the rasteriser more than samples do.
 GatherChoice software_choice() {
   GatherChoice choice = only(GatherPath::compute);
-  for (auto& by_size : choice.paths)
-    std::fill(by_size.begin() + static_cast<ptrdiff_t>(size_class(16 * 16)), by_size.end(),
-              GatherPath::raster);
+  auto& blocks = choice.paths[static_cast<size_t>(GatherShape::block)];
+  std::fill(blocks.begin() + static_cast<ptrdiff_t>(size_class(16 * 16)), blocks.end(), GatherPath::raster);
   return choice;
 }
 

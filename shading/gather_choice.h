@@ -58,7 +58,8 @@ GatherChoice only(GatherPath path);
 // kLeastGain, so that noise decides nothing that does not matter. NaN counts as infinite.
 constexpr double kLeastGain = 0.05;
 GatherChoice cheapest(const GatherCosts& costs);
-// Measured on the software device (`tessera-bench gather` measures it again).
+// By `tessera-bench gather` on the software device: blocks from 16x16 texels on by raster, all else by
+// compute.
 GatherChoice software_choice();
 // For people: "block: compute, raster from 64 samples; L: compute; half: compute".
 std::string to_text(const GatherChoice& choice);

@@ -144,11 +144,6 @@ StatusOr<double> time_load(gpu::Device& device, Gather& gather, const scene::Sce
   return stats.samples ? 1e6 * stats.gpu_ms / static_cast<double>(stats.samples) : 0;
 }
 
-double median(std::vector<double> values) {
-  std::ranges::nth_element(values, values.begin() + static_cast<ptrdiff_t>(values.size() / 2));
-  return values[values.size() / 2];
-}
-
 }  // namespace
 
 std::vector<Placement> make_load(const LoadShape& shape, std::span<const LoadTriangle> triangles,
@@ -190,7 +185,7 @@ StatusOr<GatherCosts> measure_gather_costs(gpu::Device& device, const scene::Gpu
         if (round > 0) rounds[path].push_back(ns);
       }
     Timing timing{shape};
-    for (size_t path = 0; path < rounds.size(); ++path) timing.ns[path] = median(rounds[path]);
+    for (size_t path = 0; path < rounds.size(); ++path) timing.ns[path] = std::ranges::min(rounds[path]);
     timings.push_back(timing);
   }
   return table_of(timings);

@@ -27,7 +27,7 @@ std::vector<atlas::Placement> make_load(const LoadShape& shape, std::span<const 
 
 struct CostSettings {
   uint32_t samples = 16384;  // a timing, about
-  uint32_t rounds = 3;       // the median of which counts; one more warms up
+  uint32_t rounds = 3;       // the least time of which counts: what disturbs it only adds; one more warms up
 };
 // Many enough to keep the device busy: a timing of about a millisecond.
 CostSettings cost_settings(const gpu::Device& device);
