@@ -309,7 +309,7 @@ Status Study::measure_costs() {
   const TimeNs begin = clock.now();
   TESSERA_ASSIGN_OR_RETURN(
       result_.costs, shading::measure_gather_costs(*device_, shared_->gpu_scene(), *instant_,
-                                                   shared_->lighting(), shading::cost_settings(*device_)));
+                                                   shared_->lighting(), {.samples = settings_.samples}));
   result_.costs_ms = to_ms(clock.now() - begin);
   result_.measured_choice = to_text(cheapest(result_.costs));
   result_.software_choice = to_text(shading::software_choice());

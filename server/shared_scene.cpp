@@ -27,8 +27,7 @@ Status SharedScene::choose_gather_paths(shading::GatherPath gather) {
     instant->set(0, scene().world_bounds(0).center());
     TESSERA_RETURN_IF_ERROR(lighting_->update(*instant));
     TESSERA_ASSIGN_OR_RETURN(const shading::GatherCosts costs,
-                             shading::measure_gather_costs(*device_, *gpu_scene_, *instant, *lighting_,
-                                                           shading::cost_settings(*device_)));
+                             shading::measure_gather_costs(*device_, *gpu_scene_, *instant, *lighting_));
     gather_choice_ = shading::cheapest(costs);
   }
   log_event(spdlog::level::info, "gather paths",

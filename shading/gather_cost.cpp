@@ -163,10 +163,6 @@ std::vector<Placement> make_load(const LoadShape& shape, std::span<const LoadTri
   return load;
 }
 
-CostSettings cost_settings(const gpu::Device& device) {
-  return {.samples = device.info().software ? 16384u : 1u << 20};
-}
-
 StatusOr<GatherCosts> measure_gather_costs(gpu::Device& device, const scene::GpuScene& scene,
                                            const scene::SceneInstant& instant, const Lighting& lighting,
                                            const CostSettings& settings) {

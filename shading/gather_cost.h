@@ -26,11 +26,11 @@ std::vector<atlas::Placement> make_load(const LoadShape& shape, std::span<const 
                                         uint64_t samples, uint32_t atlas_width, uint32_t atlas_height);
 
 struct CostSettings {
-  uint32_t samples = 16384;  // a timing, about
-  uint32_t rounds = 3;       // the least time of which counts: what disturbs it only adds; one more warms up
+  // A timing, about: what keeps a device busy for much longer than its passes take to begin. With few, a
+  // dispatch a material weighs more than samples do.
+  uint32_t samples = 1u << 18;
+  uint32_t rounds = 3;  // the least time of which counts: what disturbs it only adds; one more warms up
 };
-// Many enough to keep the device busy: a timing of about a millisecond.
-CostSettings cost_settings(const gpu::Device& device);
 // Times every path on made-up placements of the scene's own patches, with its materials and lights: what is
 // dear in one scene is cheap in another. `lighting` must be up to date for `instant`, which must be set.
 // Blocks. A scene without opaque patches gives zeros.
