@@ -14,6 +14,7 @@
 #include "scene/procedural.h"
 #include "server/shared_scene.h"
 #include "shading/reference.h"
+#include "shading/tessellator.h"
 
 namespace tessera::bench {
 namespace {
@@ -82,6 +83,7 @@ class Study {
   std::unique_ptr<shading::ReferenceRenderer> reference_;
   std::unique_ptr<shading::Gather> gather_;
   View view_;
+  bool tessellates_ = false;
   std::vector<uint32_t> ids_;         // of the picture, triangle + 1
   std::vector<uvec2> opaque_pixels_;  // spread over the picture
   uint64_t covered_ = 0;
@@ -108,6 +110,7 @@ Status Study::set_up() {
   TESSERA_ASSIGN_OR_RETURN(gather_,
                            shading::Gather::create(*device_, shared_->gpu_scene(), shared_->lighting(),
                                                    {.width = kAtlasWidth, .height = kAtlasHeight}));
+  tessellates_ = shading::check_tessellator(*device_).ok();
   result_.settings = settings_;
   result_.device = {device_->info().name, device_->info().driver, device_->info().software};
   return look();
@@ -164,6 +167,7 @@ Status Study::add_load(GatherRow row, std::vector<Placement> placements) {
   std::vector<GatherPath> paths(std::begin(shading::kGatherPaths), std::end(shading::kGatherPaths));
   if (row.group == "layouts") paths.push_back(GatherPath::automatic);  // others have one shape and size
   for (const GatherPath path : paths) {
+    if (path == GatherPath::tessellation && (row.group == "blocks" || !tessellates_)) continue;
     row.path = name_of(path);
     cases_.push_back({.row = row, .shade = [this, load, path] { return gather(*load, path); }});
   }

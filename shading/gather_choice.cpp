@@ -39,7 +39,9 @@ GatherChoice cheapest(const GatherCosts& costs) {
       const auto& ns = costs.ns[shape][size];
       size_t best = 0;
       for (size_t path = 1; path < ns.size(); ++path)
-        if (number(ns[path]) < (1 - kLeastGain) * number(ns[best])) best = path;
+        if (can_shade(kGatherPaths[path], static_cast<GatherShape>(shape)) &&
+            number(ns[path]) < (1 - kLeastGain) * number(ns[best]))
+          best = path;
       choice.paths[shape][size] = kGatherPaths[best];
     }
   return choice;

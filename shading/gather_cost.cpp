@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "atlas/addressing/addressing.h"
 #include "atlas/tessellated/packing.h"
+#include "shading/tessellator.h"
 
 namespace tessera::shading {
 namespace {
@@ -101,7 +103,7 @@ double samples_of(const LoadShape& shape) {
 
 struct Timing {
   LoadShape shape;
-  std::array<double, std::size(kGatherPaths)> ns{};
+  std::array<double, std::size(kGatherPaths)> ns{};  // infinite: it cannot
 };
 
 // Between the measured sizes linear in the logarithm, beyond them as the nearest.
@@ -111,6 +113,7 @@ double interpolated(std::span<const Timing> by_size, size_t path, double log_sam
     const double log = log_of(by_size[i]);
     if (log_samples > log && i + 1 < by_size.size()) continue;
     if (i == 0 || log_samples >= log) return by_size[i].ns[path];
+    if (std::isinf(by_size[i].ns[path])) return by_size[i].ns[path];
     const double before = log_of(by_size[i - 1]), t = (log_samples - before) / (log - before);
     return std::lerp(by_size[i - 1].ns[path], by_size[i].ns[path], t);
   }
@@ -170,18 +173,23 @@ StatusOr<GatherCosts> measure_gather_costs(gpu::Device& device, const scene::Gpu
   if (triangles.empty()) return GatherCosts{};
   TESSERA_ASSIGN_OR_RETURN(const auto gather, Gather::create(device, scene, lighting,
                                                              {.width = kAtlasSide, .height = kAtlasSide}));
+  const bool tessellates = check_tessellator(device).ok();
   std::vector<Timing> timings;
   for (const LoadShape& shape : timed_shapes()) {
     const std::vector<Placement> load = make_load(shape, triangles, settings.samples, kAtlasSide, kAtlasSide);
     std::array<std::vector<double>, std::size(kGatherPaths)> rounds;
     for (uint32_t round = 0; round <= settings.rounds; ++round)  // the first warms up
       for (size_t path = 0; path < rounds.size(); ++path) {
+        if (!can_shade(kGatherPaths[path], shape.shape)) continue;
+        if (kGatherPaths[path] == GatherPath::tessellation && !tessellates) continue;
         TESSERA_ASSIGN_OR_RETURN(const double ns,
                                  time_load(device, *gather, instant, load, kGatherPaths[path]));
         if (round > 0) rounds[path].push_back(ns);
       }
     Timing timing{shape};
-    for (size_t path = 0; path < rounds.size(); ++path) timing.ns[path] = std::ranges::min(rounds[path]);
+    for (size_t path = 0; path < rounds.size(); ++path)
+      timing.ns[path] =
+          rounds[path].empty() ? std::numeric_limits<double>::infinity() : std::ranges::min(rounds[path]);
     timings.push_back(timing);
   }
   return table_of(timings);

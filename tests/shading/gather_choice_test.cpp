@@ -49,6 +49,16 @@ TEST(GatherChoice, TakesTheCheapestOfEachShapeAndSize) {
   EXPECT_FALSE(only(GatherPath::compute).uses(GatherPath::raster));
 }
 
+TEST(GatherChoice, NothingIsShadedByWhatCannot) {
+  GatherCosts costs = flat(100, 200);
+  for (auto& by_size : costs.ns)
+    for (auto& by_path : by_size) by_path.back() = 1;
+  const GatherChoice choice = cheapest(costs);
+  EXPECT_EQ(choice, only(GatherPath::tessellation));
+  EXPECT_EQ(choice.of(GatherShape::block, 4096), GatherPath::compute);
+  EXPECT_EQ(choice.of(GatherShape::l, 4096), GatherPath::tessellation);
+}
+
 TEST(GatherChoice, NoiseAndWhatIsNoNumberDecideNothing) {
   EXPECT_EQ(cheapest(flat(100, 96)), only(GatherPath::compute));
   EXPECT_EQ(cheapest(flat(100, 94)), only(GatherPath::raster));
@@ -129,12 +139,13 @@ TEST(GatherChoice, ChangesNoPicture) {
   GatherCosts mixed = flat(100, 200);
   for (auto& by_size : mixed.ns)
     for (size_t size = 0; size < kSizeClasses; size += 2) by_size[size][kRaster] = 50;
-  for (const GatherChoice& choice : {only(GatherPath::raster), cheapest(mixed), software_choice()}) {
+  for (const GatherChoice& choice :
+       {only(GatherPath::raster), only(GatherPath::tessellation), cheapest(mixed), software_choice()}) {
     settings.path = GatherPath::automatic;
     settings.choice = choice;
     const GatherResult other = gather(world, {0, 1.6, 0}, placements, settings);
     EXPECT_EQ(other.stats.samples, compute.stats.samples);
-    EXPECT_GT(other.stats.raster_blocks, 0u);
+    EXPECT_GT(other.stats.raster_blocks + other.stats.tessellated_blocks, 0u);
     size_t used = 0, differing = 0;
     for (size_t i = 0; i < compute.atlas.rgba.size(); ++i) {
       used += compute.atlas.rgba[i | 3] != 0;
