@@ -4,8 +4,9 @@
 // Forward shading is the reference renderer with one sample a pixel. Its time is that of its depth pass and
 // of its shading pass, per pixel that geometry covers; the copy of the picture is not counted. Shadow maps
 // are drawn before and count for nobody. A gather's time is its device interval: work lists are made on the
-// CPU before. All shade the same surfaces: shapes are given to triangles in proportion to the pixels that
-// show them, but for masked materials, which have another cost (coverage) in the atlas.
+// CPU before. A sample is a texel that is filled: tessellation shades one that lies twice in an L once. All
+// shade the same surfaces: shapes are given to triangles in proportion to the pixels that show them, but for
+// masked materials, which have another cost (coverage) in the atlas.
 #pragma once
 
 #include <optional>
