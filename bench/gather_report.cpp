@@ -181,10 +181,10 @@ json to_json(const GatherStudyResult& result) {
 }
 
 std::string to_text(const GatherStudyResult& result) {
-  std::string text = absl::StrFormat("%-8s %-14s %-8s %9s %22s %20s %20s\n", "group", "load", "path",
+  std::string text = absl::StrFormat("%-8s %-14s %-12s %9s %22s %20s %20s\n", "group", "load", "path",
                                      "samples", "ns a sample", "to forward", "to its shading pass");
   for (const GatherRow& row : result.rows)
-    absl::StrAppendFormat(&text, "%-8s %-14s %-8s %9d %22s %20s %20s  %s\n", row.group, row.name, row.path,
+    absl::StrAppendFormat(&text, "%-8s %-14s %-12s %9d %22s %20s %20s  %s\n", row.group, row.name, row.path,
                           row.samples, cell(row.ns), cell(row.ratio), cell(row.ratio_shading), note_of(row));
   absl::StrAppend(&text, "(median, quartiles of the rounds)\n", summary(result));
   if (result.texel_tiles > 0) text += texel_summary(result);
