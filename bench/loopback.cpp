@@ -122,7 +122,7 @@ Status Loopback::set_up() {
   path_.emplace(std::move(path));
   if (scene_->features.alpha_blend)
     result_.notes.push_back("blended materials are drawn opaque, in the truth too");
-  TESSERA_ASSIGN_OR_RETURN(shared_, server::SharedScene::create(device_, scene_));
+  TESSERA_ASSIGN_OR_RETURN(shared_, server::SharedScene::create(device_, scene_, {}, settings_.gather));
   TESSERA_ASSIGN_OR_RETURN(truth_, TruthSource::create(shared_, settings_.scene, settings_.truth_cache,
                                                        settings_.truth == Truth::one ? 1 : 4));
   patch_of_.emplace(*scene_);

@@ -12,6 +12,7 @@
 #include "bench/codec_study.h"
 #include "bench/culling.h"
 #include "bench/file_io.h"
+#include "bench/gather_study.h"
 #include "bench/layout_study.h"
 #include "bench/loopback.h"
 #include "bench/memory.h"
@@ -27,7 +28,7 @@ enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
 constexpr char kFooter[] =
     R"(Configuration: every option is also an environment variable (--delay-ms = TESSERA_BENCH_DELAY_MS) and a key
-of the --config file, under [loopback], [culling], [memory], [spatial] or [codec]. Flags win over the file, the file over the environment.
+of the --config file, under [loopback], [culling], [memory], [spatial], [codec] or [gather]. Flags win over the file, the file over the environment.
 
 Exit codes: 0 done, 1 the run failed, 2 wrong usage.)";
 
@@ -68,6 +69,13 @@ constexpr char kSpatialFooter[] = R"(Examples:
   tessera-bench spatial --report report
   tessera-bench spatial --scene sponza.glb --path sponza_1.csv --seconds 10 --json spatial.json --report report
   tessera-bench spatial --size 960x540 --atlas 2048x2048 --server-fps 0.5)";
+
+constexpr char kGatherFooter[] = R"(Examples:
+  tessera-bench gather --json gather.json --report report
+  tessera-bench gather --scene sponza.glb --path sponza_1.csv --start 10 --rounds 15
+  tessera-bench gather --groups blocks,costs --samples 200000
+
+Each load is shaded on every path, after a forward picture; ratios are those of the same round, medians and quartiles.)";
 
 template <class Settings>
 std::string command_line(std::string command, const Settings& settings) {
@@ -230,6 +238,21 @@ int run_codec(const bench::CodecStudySettings& settings) {
   return write_json(settings.common.json, *result);
 }
 
+int run_gather(const bench::GatherStudySettings& settings) {
+  const SteadyClock clock;
+  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
+  StatusOr<bench::GatherStudyResult> result = bench::run_gather_study(settings, progress);
+  if (!result.ok()) return report_failure(result.status());
+  result->command = command_line("tessera-bench gather", settings);
+  std::cout << bench::to_text(*result) << std::flush;
+  if (const int code = write_json(settings.common.json, *result); code != kOk) return code;
+  if (settings.common.report.empty()) return kOk;
+  const Status written = bench::write_gather_report(settings.common.report, *result);
+  if (!written.ok()) return report_failure(written);
+  std::cerr << "report: " << settings.common.report << "/gather.html" << std::endl;
+  return kOk;
+}
+
 int run_layouts(const bench::LayoutStudySettings& settings) {
   const SteadyClock clock;
   bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
@@ -310,6 +333,12 @@ int main(int argc, char** argv) {
   codec->footer(kCodecFooter);
   codec->fallthrough();
 
+  CLI::App* gather = app.add_subcommand("gather", "cost of a shaded sample by shape, size and path");
+  bench::GatherStudySettings gather_settings;
+  bench::add_options(*gather, gather_settings);
+  gather->footer(kGatherFooter);
+  gather->fallthrough();
+
   CLI::App* layouts =
       app.add_subcommand("layouts", "error by samples and bits by error of every atlas layout");
   bench::LayoutStudySettings layout_settings = bench::default_layout_study_settings();
@@ -334,6 +363,7 @@ int main(int argc, char** argv) {
   if (memory->parsed()) return run_memory(memory_settings);
   if (culling->parsed()) return run_culling(culling_settings);
   if (codec->parsed()) return run_codec(codec_settings);
+  if (gather->parsed()) return run_gather(gather_settings);
   if (layouts->parsed()) return run_layouts(layout_settings);
   return spatial->parsed() ? run_spatial(spatial_settings) : run_report(folder);
 }

@@ -118,13 +118,18 @@ class RealLoopback {
 
 Status RealLoopback::start_daemon() {
   TESSERA_ASSIGN_OR_RETURN(
-      daemon_,
-      Program::start({.file = sibling_program("tesserad"),
-                      .arguments = {"--scene", "scene=" + s_.scene, "--device", s_.device, "--control-port",
-                                    "0", "--meta-port", "0", "--media-port", "0", "--http-port", "0",
-                                    "--max-sessions", absl::StrCat(s_.sessions), "--max-watchers",
-                                    absl::StrCat(s_.sessions + kSpareWatchers), "--log-format", "json"},
-                      .log = file("tesserad.log")}));
+      daemon_, Program::start({.file = sibling_program("tesserad"),
+                               .arguments = {"--scene",        "scene=" + s_.scene,
+                                             "--device",       s_.device,
+                                             "--gather",       std::string(shading::name_of(s_.gather)),
+                                             "--control-port", "0",
+                                             "--meta-port",    "0",
+                                             "--media-port",   "0",
+                                             "--http-port",    "0",
+                                             "--max-sessions", absl::StrCat(s_.sessions),
+                                             "--max-watchers", absl::StrCat(s_.sessions + kSpareWatchers),
+                                             "--log-format",   "json"},
+                               .log = file("tesserad.log")}));
   while (true) {
     if (const auto line = serving_line(daemon_->output())) {
       control_ = v1::Control::NewStub(

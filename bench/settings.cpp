@@ -28,6 +28,8 @@ void for_each_option(Settings& s, Visitor&& visit) {
   visit("Server", "codec", s.codec, "atlas coding; raw does without, whatever the bit rate");
   visit("Server", "bitrate-mbps", s.bitrate_mbps, "atlas and meta together");
   visit("Server", "pvs", s.pvs, "prediction of the potentially visible set");
+  visit("Server", "gather", s.gather,
+        "passes that shade the atlas; auto: those that cost least on the device");
   visit("Server", "device", s.device, "Vulkan device: cpu, an index, or part of its name");
   visit("Server", "validation", s.validation, "load the Vulkan validation layer, which logs misuse");
   visit("Network", "delay-ms", s.delay_ms, "one way");
@@ -64,6 +66,12 @@ const std::map<std::string, AtlasCodec> kCodecs = [] {
 const std::map<std::string, Truth> kTruths{{"4x", Truth::supersampled}, {"1x", Truth::one}};
 const std::map<std::string, Prediction> kPredictions{{"linear", Prediction::linear},
                                                      {"none", Prediction::none}};
+const std::map<std::string, shading::GatherPath> kGathers = [] {
+  std::map<std::string, shading::GatherPath> paths;
+  for (const std::string_view name : shading::kGatherPathNames)
+    paths.emplace(name, *shading::gather_path_named(name));
+  return paths;
+}();
 
 template <class E>
 std::string name_of(const std::map<std::string, E>& names, E value) {
@@ -106,6 +114,10 @@ struct AddOption {
   void operator()(const char* group, const std::string& name, Prediction& field, const char* meaning) const {
     add_choice(group, name, field, meaning, kPredictions);
   }
+  void operator()(const char* group, const std::string& name, shading::GatherPath& field,
+                  const char* meaning) const {
+    add_choice(group, name, field, meaning, kGathers);
+  }
 
   template <class E>
   void add_choice(const char* group, const std::string& name, E& field, const char* meaning,
@@ -143,6 +155,9 @@ struct WriteJson {
   }
   void operator()(const char*, const char* name, Prediction field, const char*) const {
     out[name] = name_of(kPredictions, field);
+  }
+  void operator()(const char*, const char* name, shading::GatherPath field, const char*) const {
+    out[name] = name_of(kGathers, field);
   }
 };
 

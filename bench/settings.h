@@ -13,6 +13,7 @@
 #include "base/atlas_codec.h"
 #include "base/status.h"
 #include "gpu/device.h"
+#include "shading/gather_choice.h"
 
 namespace CLI {
 class App;
@@ -49,6 +50,7 @@ struct LoopbackSettings {
   AtlasCodec codec = AtlasCodec::h264;
   double bitrate_mbps = 20;  // atlas and meta together
   Prediction pvs = Prediction::linear;
+  shading::GatherPath gather = shading::GatherPath::automatic;
   std::string device = "cpu";
   bool validation = gpu::DeviceOptions{}.validation;
   // Network

@@ -158,7 +158,8 @@ StatusOr<std::unique_ptr<ShadingStreamer>> ShadingStreamer::create(std::shared_p
     gpu::Device& device = scene->device();
     TESSERA_ASSIGN_OR_RETURN(impl->reader,
                              ImageReader::create(device, settings.atlas.width, settings.atlas.height));
-    const shading::GatherSettings gather{settings.atlas.width, settings.atlas.height};
+    const shading::GatherSettings gather{settings.atlas.width, settings.atlas.height,
+                                         shading::GatherPath::automatic, scene->gather_choice()};
     TESSERA_ASSIGN_OR_RETURN(impl->fresh_gather,
                              shading::Gather::create(device, scene->gpu_scene(), scene->lighting(), gather));
   }

@@ -11,6 +11,7 @@
 #include <iterator>
 #include <utility>
 
+#include "absl/strings/str_join.h"
 #include "base/log.h"
 #include "proto/control_access.h"
 #include "server/control_guard.h"
@@ -97,6 +98,12 @@ Status check(const DaemonSettings& settings) {
   TESSERA_RETURN_IF_ERROR(stream_settings(settings).status());
   TESSERA_RETURN_IF_ERROR(control_token(settings).status());
   for (const std::string& scene : settings.scenes) TESSERA_RETURN_IF_ERROR(name_and_source(scene).status());
+  if (!shading::gather_path_named(settings.gather)) {
+    const std::vector<std::string> names(std::begin(shading::kGatherPathNames),
+                                         std::end(shading::kGatherPathNames));
+    return absl::InvalidArgumentError(
+        absl::StrCat("--gather ", settings.gather, ": must be one of ", absl::StrJoin(names, ", ")));
+  }
   return absl::OkStatus();
 }
 
@@ -136,7 +143,8 @@ Status Daemon::Impl::start(const DaemonSettings& settings, const Clock& clock) {
   metrics = std::make_unique<Metrics>(info);
   stream.on_rendered = [this](const FrameStats& frame) { metrics->on_rendered(frame); };
   TESSERA_ASSIGN_OR_RETURN(streams, StreamServer::create(stream, clock));
-  scenes = std::make_unique<SceneLibrary>(device, *streams, settings.scene_root, settings.max_scene_mib);
+  scenes = std::make_unique<SceneLibrary>(device, *streams, settings.scene_root, settings.max_scene_mib,
+                                          *shading::gather_path_named(settings.gather));
   control = std::make_unique<ControlService>(*streams, *scenes, info);
   pages.set_metrics([this] { return metrics->text(*streams, *scenes, *control); });
   TESSERA_RETURN_IF_ERROR(serve_control(settings, clock));

@@ -30,6 +30,7 @@ struct DaemonSettings {
   std::vector<std::string> scenes;   // NAME=SOURCE, loaded at the start
   std::string scene_root;            // where LoadScene may read files; empty: nowhere
   std::string device = "cpu";
+  std::string gather = "auto";  // which passes shade the atlas: a name of shading::kGatherPathNames
 
   bool operator==(const DaemonSettings&) const = default;
 };

@@ -58,6 +58,11 @@ void add_options(CLI::App& app, DaemonSettings& s, LogSettings& log) {
   add("Scenes", "max-scene-mib", s.max_scene_mib, "device memory of all scenes together; 0: no limit")
       ->check(CLI::Range(0, 1 << 20));
   add("Rendering", "device", s.device, "Vulkan device: cpu, an index, or part of its name");
+  std::vector<std::string> paths;
+  for (const std::string_view path : shading::kGatherPathNames) paths.emplace_back(path);
+  add("Rendering", "gather", s.gather,
+      "passes that shade the atlas; auto: those that cost least on the device")
+      ->check(CLI::IsMember(paths));
   add("Logs", "log", log.level, "level on standard error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
   add("Logs", "log-format", log.format, "text (event key=value …) or json, a line an event")

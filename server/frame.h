@@ -30,7 +30,6 @@ struct SessionSettings {
   atlas::LayoutSettings layout;
   pvs::PredictionSettings prediction;  // horizon_ns is set for every frame
   pvs::VisibilitySettings visibility;
-  shading::GatherPath gather_path = shading::GatherPath::automatic;
   RateSplit rate;
   AtlasCodec codec = AtlasCodec::h264;
   std::string encoder = "auto";  // of H.264

@@ -27,8 +27,12 @@ StatusOr<std::shared_ptr<scene::Scene>> import(const std::string& source, scene:
 }  // namespace
 
 SceneLibrary::SceneLibrary(std::shared_ptr<gpu::Device> device, StreamServer& server, fs::path root,
-                           uint32_t max_device_mib)
-    : device_(std::move(device)), server_(server), root_(std::move(root)), max_device_mib_(max_device_mib) {}
+                           uint32_t max_device_mib, shading::GatherPath gather)
+    : device_(std::move(device)),
+      server_(server),
+      root_(std::move(root)),
+      max_device_mib_(max_device_mib),
+      gather_(gather) {}
 
 SceneLibrary::~SceneLibrary() {
   (void)server_.run_on_device([this] {
@@ -103,7 +107,7 @@ StatusOr<SceneLibrary::Entry> SceneLibrary::make(const std::string& name, const 
                        .plan = make_frame_plan(scene->features)}};
   TESSERA_RETURN_IF_ERROR(server_.run_on_device([&]() -> Status {
     const uint64_t before = device_->memory_in_use();
-    TESSERA_ASSIGN_OR_RETURN(entry.scene, SharedScene::create(device_, scene));
+    TESSERA_ASSIGN_OR_RETURN(entry.scene, SharedScene::create(device_, scene, {}, gather_));
     entry.info.device_mib = static_cast<double>(device_->memory_in_use() - before) / (1 << 20);
     const double room = room_mib();  // others may have come in meanwhile
     if (max_device_mib_ == 0 || entry.info.device_mib <= room) {

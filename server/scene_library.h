@@ -30,7 +30,7 @@ class SceneLibrary {
   // `root`: files that load() may read lie below it; empty: only procedural scenes.
   // `max_device_mib`: of all scenes together; 0: no limit.
   SceneLibrary(std::shared_ptr<gpu::Device> device, StreamServer& server, std::filesystem::path root,
-               uint32_t max_device_mib);
+               uint32_t max_device_mib, shading::GatherPath gather = shading::GatherPath::automatic);
   ~SceneLibrary();
 
   // InvalidArgument: a name that is not 1..64 of [A-Za-z0-9._-], or a source outside the root. AlreadyExists.
@@ -59,6 +59,7 @@ class SceneLibrary {
   StreamServer& server_;
   const std::filesystem::path root_;
   const uint32_t max_device_mib_;
+  const shading::GatherPath gather_;
   mutable std::mutex mutex_;
   std::map<std::string, Entry> entries_;
 };

@@ -83,7 +83,7 @@ Status Session::Impl::set_up() {
   }
   TESSERA_ASSIGN_OR_RETURN(layout, atlas::create_layout(scene->scene(), settings.layout));
   const shading::GatherSettings gather_settings{settings.layout.width, settings.layout.height,
-                                                settings.gather_path};
+                                                shading::GatherPath::automatic, scene->gather_choice()};
   TESSERA_ASSIGN_OR_RETURN(
       gather, shading::Gather::create(device, scene->gpu_scene(), scene->lighting(), gather_settings));
   TESSERA_ASSIGN_OR_RETURN(

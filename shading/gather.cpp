@@ -1,8 +1,10 @@
 #include "shading/gather.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "shading/features.h"
+#include "shading/gather_pass.h"
 #include "shading/gather_work.h"
 #include "shading/growing_buffer.h"
 #include "shading/material_groups.h"
@@ -24,35 +26,6 @@ constexpr uint32_t kMaxGroupsX = 32768;  // Vulkan guarantees 65535
 
 enum GatherBinding : uint32_t { kBlocks = 1, kStarts, kColors, kAtlas };
 
-// Pass in shading/shaders/gather.glsl.
-struct PassPush {
-  vec4 eye, axis, ray_x, ray_y;
-  uint32_t width, height;
-  uint32_t first_chunk, end_chunk;
-};
-
-PassPush pass_of(const View& viewer, const dvec3& origin) {
-  const glm::dmat3 axes = glm::mat3_cast(viewer.pose.orientation);
-  const Fov& fov = viewer.fov;
-  return {.eye = vec4(vec3(viewer.pose.position - origin), 1),
-          .axis = vec4(vec3(-axes[2]), 0),
-          .ray_x = vec4(vec3(axes[0]) * ((fov.right - fov.left) / static_cast<float>(viewer.width)), 0),
-          .ray_y = vec4(vec3(axes[1]) * ((fov.up - fov.down) / static_cast<float>(viewer.height)), 0)};
-}
-
-uint64_t raster_from_texels(GatherPath path) {
-  switch (path) {
-    case GatherPath::compute:
-    case GatherPath::tessellation:
-      return ~uint64_t{0};
-    case GatherPath::raster:
-      return 0;
-    case GatherPath::automatic:
-      break;
-  }
-  return 16 * 16;
-}
-
 }  // namespace
 
 struct Gather::Impl {
@@ -61,18 +34,22 @@ struct Gather::Impl {
   const Lighting& lighting;
   GatherSettings settings;
   MaterialGroups groups;
-  gpu::ComputePipeline compute;
-  gpu::RasterPipeline raster;
-  gpu::TessellationPipeline tessellation;
+  GatherChoice choice;
+  gpu::ComputePipeline compute;               // single colours are computed on every path
+  std::optional<gpu::RasterPipeline> raster;  // these only if they are used
+  std::optional<gpu::TessellationPipeline> tessellation;
   gpu::Image image;
   gpu::Buffer blocks, starts, colors;
   uint32_t color_count = 0;
   mutable GatherStats stats;
 
   Status create();
-  Status create_pipelines();
-  Status create_tessellation(const std::vector<const gpu::BindLayout*>& layouts,
-                             const std::vector<gpu::Constant>& constants);
+  Status create_compute();
+  Status create_raster();
+  Status create_tessellation();
+  Status choose(const GatherChoice& wanted);
+  std::vector<const gpu::BindLayout*> layouts() const;
+  std::vector<gpu::Constant> constants() const;
   Status upload(const GatherWork& work);
   Status fit(uint32_t binding, gpu::Buffer& buffer, uint64_t bytes, gpu::Memory memory);
   void record_compute(gpu::Commands& commands, const scene::SceneInstant& instant, PassPush push,
@@ -97,47 +74,62 @@ Status Gather::Impl::create() {
   TESSERA_ASSIGN_OR_RETURN(image, gpu::Image::create(device, desc, "atlas"));
   groups.set(kAtlas, image);
   TESSERA_RETURN_IF_ERROR(upload({}));
-  TESSERA_RETURN_IF_ERROR(create_pipelines());
+  TESSERA_RETURN_IF_ERROR(create_compute());
+  TESSERA_RETURN_IF_ERROR(
+      choose(settings.path == GatherPath::automatic ? settings.choice : only(settings.path)));
   gpu::Commands commands = device.begin();
   commands.clear(image, kMidGrey);
   commands.barrier();
   return device.run(std::move(commands));
 }
 
-Status Gather::Impl::create_pipelines() {
-  const std::vector<const gpu::BindLayout*> layouts{&scene.layout(), &scene.instant_layout(),
-                                                    &lighting.layout(), &groups.layout()};
+std::vector<const gpu::BindLayout*> Gather::Impl::layouts() const {
+  return {&scene.layout(), &scene.instant_layout(), &lighting.layout(), &groups.layout()};
+}
+
+std::vector<gpu::Constant> Gather::Impl::constants() const {
   std::vector<gpu::Constant> constants = scene.constants();
   for (const gpu::Constant& c : lighting.constants()) constants.push_back(c);
-  // Single colours are computed on every path.
+  return constants;
+}
+
+Status Gather::Impl::create_compute() {
   TESSERA_ASSIGN_OR_RETURN(compute, gpu::ComputePipeline::create(device, {.name = "gather compute",
                                                                           .shader = gather_comp,
-                                                                          .layouts = layouts,
+                                                                          .layouts = layouts(),
                                                                           .push_bytes = sizeof(PassPush),
-                                                                          .constants = constants}));
-  if (settings.path == GatherPath::compute) return absl::OkStatus();
-  if (settings.path == GatherPath::tessellation) return create_tessellation(layouts, constants);
+                                                                          .constants = constants()}));
+  return absl::OkStatus();
+}
+
+Status Gather::Impl::create_raster() {
   TESSERA_ASSIGN_OR_RETURN(raster, gpu::RasterPipeline::create(device, {.name = "gather raster",
                                                                         .vertex = gather_vert,
                                                                         .fragment = gather_frag,
-                                                                        .layouts = layouts,
+                                                                        .layouts = layouts(),
                                                                         .push_bytes = sizeof(PassPush),
-                                                                        .constants = constants,
+                                                                        .constants = constants(),
                                                                         .colors = {kAtlasFormat}}));
   return absl::OkStatus();
 }
 
-Status Gather::Impl::create_tessellation(const std::vector<const gpu::BindLayout*>& layouts,
-                                         const std::vector<gpu::Constant>& constants) {
+Status Gather::Impl::create_tessellation() {
   TESSERA_RETURN_IF_ERROR(check_tessellator(device));
   TESSERA_ASSIGN_OR_RETURN(tessellation,
                            gpu::TessellationPipeline::create(device, {.name = "gather tessellation",
                                                                       .vertex = gather_patch_vert,
                                                                       .control = patch_tesc,
                                                                       .evaluation = gather_tese,
-                                                                      .layouts = layouts,
+                                                                      .layouts = layouts(),
                                                                       .push_bytes = sizeof(PassPush),
-                                                                      .constants = constants}));
+                                                                      .constants = constants()}));
+  return absl::OkStatus();
+}
+
+Status Gather::Impl::choose(const GatherChoice& wanted) {
+  if (wanted.uses(GatherPath::raster) && !raster) TESSERA_RETURN_IF_ERROR(create_raster());
+  if (wanted.uses(GatherPath::tessellation) && !tessellation) TESSERA_RETURN_IF_ERROR(create_tessellation());
+  choice = wanted;
   return absl::OkStatus();
 }
 
@@ -184,7 +176,7 @@ void Gather::Impl::record_raster(gpu::Commands& commands, const scene::SceneInst
   const gpu::ColorAttachment atlas{.image = &image};
   commands.begin_rendering({.colors = {&atlas, 1}, .width = settings.width, .height = settings.height});
   for (const DrawBatch& batch : work.raster_batches) {
-    commands.bind(raster, {&scene.group(), &instant.group(), &lighting.group(), &groups.of(batch.material)});
+    commands.bind(*raster, {&scene.group(), &instant.group(), &lighting.group(), &groups.of(batch.material)});
     commands.push(push);
     commands.draw(6, batch.block_count, 0, batch.first_block);
   }
@@ -196,7 +188,7 @@ void Gather::Impl::record_tessellation(gpu::Commands& commands, const scene::Sce
   if (work.tessellation_batches.empty()) return;
   commands.begin_rendering({.width = 1, .height = 1});  // nothing is rasterised
   for (const DrawBatch& batch : work.tessellation_batches) {
-    commands.bind(tessellation,
+    commands.bind(*tessellation,
                   {&scene.group(), &instant.group(), &lighting.group(), &groups.of(batch.material)});
     commands.push(push);
     commands.draw(batch.block_count, 1, batch.first_block);
@@ -215,11 +207,13 @@ StatusOr<std::unique_ptr<Gather>> Gather::create(gpu::Device& device, const scen
   return std::unique_ptr<Gather>(new Gather(std::move(impl)));
 }
 
+Status Gather::choose(const GatherChoice& choice) {
+  return impl_->choose(choice);
+}
+
 Status Gather::record(gpu::Commands& commands, const scene::SceneInstant& instant, const View& viewer,
                       std::span<const atlas::Placement> placements) {
-  const GatherLimits limits{impl_->settings.width, impl_->settings.height,
-                            raster_from_texels(impl_->settings.path),
-                            impl_->settings.path == GatherPath::tessellation};
+  const GatherLimits limits{impl_->settings.width, impl_->settings.height, impl_->choice};
   TESSERA_ASSIGN_OR_RETURN(const GatherWork work, build_gather_work(impl_->scene, placements, limits));
   TESSERA_RETURN_IF_ERROR(impl_->upload(work));
   PassPush push = pass_of(viewer, instant.origin());

@@ -1,5 +1,6 @@
-// Shades the samples of placed patches into the atlas image (the gather). Three paths with the same result:
-// raster rectangles for large blocks, compute for small ones, and the tessellation stages.
+// Shades the samples of placed patches into the atlas image (the gather), on paths with the same result: one
+// invocation a sample in compute, raster rectangles, or the tessellation stages. Which is cheapest depends on
+// shape, size and device.
 #pragma once
 
 #include <memory>
@@ -9,18 +10,15 @@
 #include "base/view.h"
 #include "gpu/image.h"
 #include "scene/gpu_scene.h"
+#include "shading/gather_choice.h"
 #include "shading/lighting.h"
 
 namespace tessera::shading {
 
-// Single colours are computed on every path. `tessellation` shades Ls and halves in the evaluation shader,
-// one invocation for each vertex of a tessellated triangle (TSS section 3), and computes blocks; it needs a
-// device that passes check_tessellator() (tessellator.h). `automatic` does not choose it.
-enum class GatherPath { automatic, compute, raster, tessellation };
-
 struct GatherSettings {
   uint32_t width = 2048, height = 1024;     // of the atlas
-  GatherPath path = GatherPath::automatic;  // automatic: raster from 16x16 texels on
+  GatherPath path = GatherPath::automatic;  // automatic: as `choice` says
+  GatherChoice choice = software_choice();
 };
 
 struct GatherStats {
@@ -37,11 +35,14 @@ struct GatherStats {
 // keep the colour that they had (a still image costs a video coder nothing), mid-grey at first.
 class Gather {
  public:
-  // FailedPrecondition where the path is tessellation and the device cannot do it.
+  // FailedPrecondition where a path is tessellation and the device cannot do it.
   static StatusOr<std::unique_ptr<Gather>> create(gpu::Device& device, const scene::GpuScene& scene,
                                                   const Lighting& lighting, const GatherSettings& settings);
   ~Gather();
 
+  // For what is recorded from now on. Makes the pipelines that it needs and that were not needed before;
+  // FailedPrecondition as in create().
+  Status choose(const GatherChoice& choice);
   // Shades all `placements` as seen by `viewer`: from its eye, with textures filtered for its pixels or for
   // the texels, whichever are wider. Records into `commands`, as the interval "gather" (so not within another
   // interval) and with a barrier at its end; the same Gather must not be recorded again before that work is

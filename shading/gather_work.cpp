@@ -1,7 +1,6 @@
 #include "shading/gather_work.h"
 
 #include "atlas/addressing/addressing.h"
-#include "shading/gather.h"
 #include "shading/tessellator.h"
 
 namespace tessera::shading {
@@ -38,6 +37,11 @@ uint64_t item_samples(const BlockRecord& r) {
            (r.shape & kBlockMasked ? 2 : 1);
   if (r.shape & kBlockHalf) return static_cast<uint64_t>(addressing::staircase_samples(stairs_of(r)));
   return uint64_t{r.size & 0xffff} * (r.size >> 16);
+}
+
+GatherShape shape_of(const BlockRecord& r) {
+  if (r.shape & kBlockL) return GatherShape::l;
+  return r.shape & kBlockHalf ? GatherShape::half : GatherShape::block;
 }
 
 // Of a record of the tessellation path.
@@ -240,12 +244,11 @@ class Items {
     TESSERA_RETURN_IF_ERROR(check_rectangle(x, y, width, height, limits_));
     record.place = packed(x, y);
     work_.samples += item_samples(record);
-    if (limits_.tessellate && (record.shape & (kBlockL | kBlockHalf)))
+    const GatherPath path = limits_.choice.of(shape_of(record), item_samples(record));
+    if (path == GatherPath::tessellation)
       add_triangles(record);
     else
-      items_.push_back(
-          {record, material_,
-           item_samples(record) >= limits_.raster_from_texels ? GatherPath::raster : GatherPath::compute});
+      items_.push_back({record, material_, path});
     return absl::OkStatus();
   }
 

@@ -8,6 +8,7 @@
 #include "atlas/placement.h"
 #include "base/status.h"
 #include "scene/gpu_scene.h"
+#include "shading/gather_choice.h"
 
 namespace tessera::shading {
 
@@ -52,9 +53,8 @@ struct GatherWork {
 };
 
 struct GatherLimits {
-  uint32_t width, height;       // of the atlas
-  uint64_t raster_from_texels;  // blocks of at least so many texels go to the raster path
-  bool tessellate;              // Ls and halves go to the tessellation path
+  uint32_t width, height;  // of the atlas
+  GatherChoice choice;
 };
 
 // InvalidArgument if a placement names no patch of the scene or leaves the atlas.

@@ -202,10 +202,13 @@ void ReferenceRenderer::Impl::record_sample(gpu::Commands& commands, const scene
                                             const DrawList& list, uint32_t sample) {
   const Targets& t = targets;
   const vec2 sample_at = t.samples == 1 ? kCentre : kFourSamples[sample];
+  commands.begin_interval("reference depth");
   commands.begin_rendering({.depth = &t.depth, .width = t.width, .height = t.height});
   draw(commands, instant, depth_pass, list, sample_at);
   commands.end_rendering();
   commands.barrier();
+  commands.end_interval();
+  commands.begin_interval("reference color");
   gpu::ColorAttachment color{.image = &t.color};
   color.clear = {kBackground[0] / 255.0f, kBackground[1] / 255.0f, kBackground[2] / 255.0f, 0.0f};
   commands.begin_rendering(
@@ -213,16 +216,17 @@ void ReferenceRenderer::Impl::record_sample(gpu::Commands& commands, const scene
   draw(commands, instant, color_pass, list, sample_at);
   commands.end_rendering();
   commands.barrier();
+  commands.end_interval();
+  commands.begin_interval("reference copy");
   commands.copy_to_buffer(t.color, t.readback, uint64_t{4} * t.width * t.height * sample);
   commands.barrier();
+  commands.end_interval();
 }
 
 void ReferenceRenderer::Impl::record_color(gpu::Commands& commands, const scene::SceneInstant& instant,
                                            const DrawList& list) {
-  commands.begin_interval("reference color");
   for (uint32_t sample = 0; sample < targets.samples; ++sample)
     record_sample(commands, instant, list, sample);
-  commands.end_interval();
 }
 
 void ReferenceRenderer::Impl::record_ids(gpu::Commands& commands, const scene::SceneInstant& instant,

@@ -37,7 +37,8 @@ class ReferenceRenderer {
                                                              const Lighting& lighting);
   ~ReferenceRenderer();
 
-  // Blocks. The background is kBackground.
+  // Blocks. The background is kBackground. Device intervals, of each sample: "reference depth", "reference
+  // color" (each visible sample is shaded once) and "reference copy"; "reference ids".
   StatusOr<ReferenceImage> render(const scene::SceneInstant& instant, const View& view,
                                   const ReferenceRequest& request);
   double gpu_ms() const;  // of the last render

@@ -202,21 +202,26 @@ Shown shown_by(Block block, ivec2 texel) {
   return shown_by_rectangle(block, texel);
 }
 
-// Display-linear colour of one texel, counted from the upper left corner of its block's rectangle.
-vec3 block_texel(Block block, ivec2 texel) {
-  Shown shown = shown_by(block, texel);
+// Display-linear colour of what a texel shows; `shown` is spaced.
+vec3 shown_color(uint instance, uint first_triangle, Shown shown) {
   TrianglePoint point = shown.point;
-  if (block.spacing != 0u) space_point(corner_distances(block.spacing, block.shape & 3u, shown.triangle), point);
   // The client's bilinear fetch smooths once more: half a texel's filter keeps the sum near one texel.
   point.ddx *= 0.5;
   point.ddy *= 0.5;
-  Stand stand = load_stand(block.instance);
-  Triangle t = fetch_triangle(stand, block.first_triangle + uint(shown.triangle));
+  Stand stand = load_stand(instance);
+  Triangle t = fetch_triangle(stand, first_triangle + uint(shown.triangle));
   see_point(t, point);
   SurfacePoint p = surface_point(stand, t, point);
   MaterialPoint m = material_point(p);
   if (shown.coverage) return vec3(srgb_decode(coverage(m.base.a, material.alpha_cutoff)));
   return shade(p, m, pass.eye.xyz);
+}
+
+// Of one texel of a block, counted from the upper left corner of its rectangle.
+vec3 block_texel(Block block, ivec2 texel) {
+  Shown shown = shown_by(block, texel);
+  if (block.spacing != 0u) space_point(corner_distances(block.spacing, block.shape & 3u, shown.triangle), shown.point);
+  return shown_color(block.instance, block.first_triangle, shown);
 }
 
 #endif

@@ -1,3 +1,5 @@
+#include <chrono>
+
 #include "gpu_test.h"
 #include "shaders/pick.comp.spv.h"
 #include "shaders/scale.comp.spv.h"
@@ -22,6 +24,34 @@ class ComputeTest : public GpuTest {
   BindLayout layout_;
   ComputePipeline scale_;
 };
+
+// The software device once timed a dispatch after drawing to another target at next to nothing.
+TEST_F(ComputeTest, AnIntervalAfterARenderHoldsItsDispatches) {
+  const Image target = image({.width = 256, .height = 256});
+  const ColorAttachment color{.image = &target, .clear = std::array<float, 4>{}};
+  Commands drawing = device().begin();
+  drawing.begin_rendering({.colors = {&color, 1}, .width = 256, .height = 256});
+  drawing.end_rendering();
+  run(std::move(drawing));
+
+  constexpr uint32_t kValues = 1 << 20;
+  const Buffer values = buffer(4 * kValues);
+  const BindGroup bound = group(values);
+  Commands commands = device().begin();
+  commands.begin_interval("dispatches");
+  for (int i = 0; i < 20; ++i) {
+    commands.bind(scale_, {&bound});
+    commands.push(3u);
+    commands.dispatch(kValues / 64);
+    commands.barrier();
+  }
+  commands.end_interval();
+  const auto begin = std::chrono::steady_clock::now();
+  run(std::move(commands));
+  const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - begin;
+  ASSERT_EQ(device().intervals().size(), 1u);
+  EXPECT_GT(device().intervals()[0].ms, wall.count() / 10);
+}
 
 TEST_F(ComputeTest, RoundTrip) {
   const Buffer values = filled(std::vector<uint32_t>{1, 2, 3, 4, 5});

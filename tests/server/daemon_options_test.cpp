@@ -54,6 +54,7 @@ const std::vector<std::vector<std::string>> kFlags = {{"--address", "::1"},
                                                       {"--scene", "a=gallery:1", "--scene", "b=my file.glb"},
                                                       {"--scene-root", "/srv/scenes"},
                                                       {"--device", "1"},
+                                                      {"--gather", "raster"},
                                                       {"--log", "debug"},
                                                       {"--log-format", "json"}};
 
