@@ -9,6 +9,7 @@
 #include "base/camera_path.h"
 #include "bench/image_io.h"
 #include "bench/shading_streamer.h"
+#include "bench/texel_picture.h"
 #include "bench/truth_source.h"
 #include "pvs/visibility.h"
 #include "scene/gltf.h"
@@ -17,7 +18,8 @@
 namespace tessera::bench {
 namespace {
 
-constexpr char kLPacking[] = "l-packing";
+constexpr char kLPacking[] = "l-packing", kTexelShading[] = "texel-shading";
+constexpr uint64_t kMtexel = 1 << 20;
 
 // Of the layouts by name, and of "l-packing": tessellated without Oversampling.
 atlas::LayoutSettings layout_settings(const std::string& name, const Size& size) {
@@ -54,6 +56,7 @@ class Study {
   Status set_up();
   std::vector<Case> cases() const;
   Status measure(const Case& c);
+  Status measure_texel_shading();
   Status serve(ShadingStreamer& streamer, uint32_t index, const Case& c);
   Status look(ShadingStreamer& streamer, uint32_t index, const Case& c, LayoutRow& row, Series& series);
   void add_costs(const server::FrameStats& stats, LayoutRow& row, Series& series) const;
@@ -105,8 +108,11 @@ Status Study::set_up() {
 
 std::vector<Study::Case> Study::cases() const {
   std::vector<Case> out;
+  if (std::ranges::find(settings_.layouts, kTexelShading) != settings_.layouts.end())
+    out.push_back({kTexelShading, {}, std::nullopt});
   for (const Size& atlas : settings_.atlases) {
     for (const std::string& layout : settings_.layouts) {
+      if (layout == kTexelShading) continue;  // it has no atlas
       if (settings_.bitrates_mbps.empty()) out.push_back({layout, atlas, std::nullopt});
       for (const double mbps : settings_.bitrates_mbps) out.push_back({layout, atlas, mbps});
     }
@@ -218,11 +224,48 @@ Status Study::measure(const Case& c) {
   return absl::OkStatus();
 }
 
+// Nothing of it is streamed: its texture is too large. Its pictures are what a client would show that has
+// all of it, shaded a moment ago.
+Status Study::measure_texel_shading() {
+  const TimeNs begin = shown_at(kWarmUpFrames);
+  View view = client_view(settings_.common);
+  view.pose = pose_at(begin);
+  // Sets the scene's moment.
+  TESSERA_RETURN_IF_ERROR(truth_->render(view, begin, {.samples = 1, .ids = true}).status());
+  const std::vector<dmat4> transforms = truth_->instant().instance_transforms();
+  TESSERA_ASSIGN_OR_RETURN(const UniqueTexture texture,
+                           UniqueTexture::create(*scene_, transforms, settings_.texture_mtexels * kMtexel));
+  TESSERA_ASSIGN_OR_RETURN(const auto shader,
+                           TexelShader::create(*device_, shared_->gpu_scene(), shared_->lighting(), texture));
+  LayoutRow& row = result_.rows.emplace_back(LayoutRow{.layout = kTexelShading});
+  ErrorMean error;
+  for (uint32_t i = 0; i < frame_count(); ++i) {
+    progress_.advance();
+    if (!is_scored(i)) continue;
+    view.pose = pose_at(shown_at(i));
+    TESSERA_ASSIGN_OR_RETURN(const RenderedImage truth, truth_->truth(view, shown_at(i)));
+    TESSERA_ASSIGN_OR_RETURN(TexelPicture shown, draw_texels(texture, *shader, *truth_, view, shown_at(i)));
+    const Comparison compared = compare_images(truth->color, shown.image);
+    error.add(compared.error);
+    row.samples += static_cast<double>(shown.samples) / result_.frames;
+    if (i == kWarmUpFrames)
+      result_.pictures.push_back({kTexelShading,
+                                  compared.error.mssim,
+                                  truth->color,
+                                  std::move(shown.image),
+                                  dssim_picture(compared.ssim),
+                                  {}});
+  }
+  row.error = error.mean();
+  return absl::OkStatus();
+}
+
 StatusOr<LayoutStudyResult> Study::run() {
   TESSERA_RETURN_IF_ERROR(set_up());
   const std::vector<Case> all = cases();
   progress_.begin("frames", all.size() * frame_count());
-  for (const Case& c : all) TESSERA_RETURN_IF_ERROR(measure(c));
+  for (const Case& c : all)
+    TESSERA_RETURN_IF_ERROR(c.layout == kTexelShading ? measure_texel_shading() : measure(c));
   return std::move(result_);
 }
 
@@ -352,6 +395,7 @@ std::vector<std::string> layout_study_options() {
 
 nlohmann::json to_json(const LayoutStudyResult& result) {
   nlohmann::json run = run_json(result.command, result.device, result.settings.common);
+  run["settings"]["texture-mtexels"] = result.settings.texture_mtexels;
   run["settings"]["speed"] = result.settings.speed;
   run["frames"] = result.frames;
   run["rows"] = nlohmann::json::array();
@@ -371,9 +415,9 @@ void add_options(CLI::App& app, LayoutStudySettings& settings) {
   const std::vector<std::string> common = layout_study_options();
   add_options(app, settings.common, common);
   std::vector<std::string> names(std::begin(atlas::kLayoutNames), std::end(atlas::kLayoutNames));
-  names.emplace_back(kLPacking);
+  for (const char* more : {kLPacking, kTexelShading}) names.emplace_back(more);
   app.add_option("--layouts", settings.layouts,
-                 "which to measure; l-packing: tessellated without Oversampling")
+                 "which to measure; l-packing: tessellated without Oversampling; texel-shading: a baseline")
       ->check(CLI::IsMember(names))
       ->delimiter(',')
       ->group("Server")
@@ -390,6 +434,12 @@ void add_options(CLI::App& app, LayoutStudySettings& settings) {
       ->check(CLI::PositiveNumber)
       ->group("Server")
       ->envname("TESSERA_BENCH_BITRATES_MBPS");
+  app.add_option("--texture-mtexels", settings.texture_mtexels,
+                 "of texel shading's unique textures, Mi texels")
+      ->check(CLI::Range(1, 65536))
+      ->group("Server")
+      ->envname("TESSERA_BENCH_TEXTURE_MTEXELS")
+      ->capture_default_str();
   app.add_option("--speed", settings.speed, "of the camera on its path; 1 = as recorded")
       ->check(CLI::Range(0.0, 100.0))
       ->group("Client")

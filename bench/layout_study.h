@@ -1,6 +1,7 @@
 // What each layout makes of the same path: image error by shaded samples (TSS tables 3, 4), bits by image
 // error, and what drawing costs the client. One layout after another streams the same frames over a link
-// without loss; the client draws each scored frame at the pose that it has when the frame reaches it.
+// without loss; the client draws each scored frame at the pose that it has when the frame reaches it. Texel
+// shading (bench/texel_shading.h) stands beside them as a baseline.
 #pragma once
 
 #include <optional>

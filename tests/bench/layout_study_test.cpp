@@ -54,6 +54,8 @@ TEST(LayoutStudy, MeasuresEveryLayout) {
   settings.common.score_every = 1;
   settings.common.truth_cache = "none";
   settings.layouts.emplace_back("l-packing");
+  settings.layouts.emplace_back("texel-shading");
+  settings.texture_mtexels = 16;
   settings.atlases = {{512, 256}, {512, 512}};
   settings.bitrates_mbps = {4};
   std::ostringstream silent;
@@ -61,10 +63,13 @@ TEST(LayoutStudy, MeasuresEveryLayout) {
   const auto result = run_layout_study(settings, progress);
   ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_EQ(result->frames, 3u);
-  ASSERT_EQ(result->rows.size(), 8u);
-  for (size_t i = 0; i < result->rows.size(); ++i) {
+  ASSERT_EQ(result->rows.size(), 9u);
+  EXPECT_EQ(result->rows[0].layout, "texel-shading");
+  EXPECT_GT(result->rows[0].samples, 240 * 136);
+  EXPECT_GT(result->rows[0].error.mssim, 0.75);
+  for (size_t i = 1; i < result->rows.size(); ++i) {
     const LayoutRow& r = result->rows[i];
-    EXPECT_EQ(r.layout, settings.layouts[i % 4]);
+    EXPECT_EQ(r.layout, settings.layouts[(i - 1) % 4]);
     EXPECT_LE(r.samples, 1.0 * r.width * r.height + r.colors) << r.layout;
     EXPECT_GT(r.fill, 0.2) << r.layout;
     EXPECT_LE(r.fill, 1) << r.layout;
@@ -74,7 +79,7 @@ TEST(LayoutStudy, MeasuresEveryLayout) {
     EXPECT_LT(r.holes, 0.01) << r.layout;
     EXPECT_GT(r.draw_ms.p50, 0) << r.layout;
     EXPECT_EQ(r.outside_share > 0, r.layout == "tessellated");
-    if (i >= 4) {
+    if (i > 4) {
       EXPECT_GT(r.samples, result->rows[i - 4].samples) << r.layout;
     }
   }
@@ -83,7 +88,7 @@ TEST(LayoutStudy, MeasuresEveryLayout) {
   ASSERT_TRUE(write_layout_report(folder.path().string(), *result).ok());
   const auto json = read_file(folder.path() / "layouts.json");
   ASSERT_TRUE(json.ok()) << json.status();
-  EXPECT_EQ(nlohmann::json::parse(*json).at("rows").size(), 8u);
+  EXPECT_EQ(nlohmann::json::parse(*json).at("rows").size(), 9u);
   EXPECT_TRUE(std::filesystem::exists(folder.path() / "layouts.html"));
   EXPECT_TRUE(std::filesystem::exists(folder.path() / "layouts-coherent-512x512-atlas.png"));
 }
