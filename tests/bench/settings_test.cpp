@@ -42,6 +42,7 @@ LoopbackSettings unusual() {
   s.atlas = {4096, 2048};
   s.bitrate_mbps = 7.5;
   s.pvs = Prediction::none;
+  s.gather = shading::GatherPath::raster;
   s.device = "some gpu";
   s.validation = !s.validation;
   s.delay_ms = 20;

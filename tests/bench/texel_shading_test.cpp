@@ -15,7 +15,7 @@ scene::Scene square() {
   scene::Scene s;
   scene::Geometry g;
   for (const vec2 at : {vec2(-1, 1), vec2(1, 1), vec2(-1, -1), vec2(1, -1)})
-    g.vertices.push_back({.position = vec3(at, 0), .normal = {0, 0, 1}});
+    g.vertices.push_back({.position = vec3(at, 0), .normal = {0, 0, 1}, .color = ~0u});
   g.indices = {0, 2, 1, 3, 1, 2};
   g.patches = {{0, 2}};
   g.meshlets = {{0, 2, 0, 1, {}, 2}};
