@@ -20,6 +20,7 @@ struct LayoutStudySettings {
   std::vector<Size> atlases{{1024, 1024}, {2048, 1024}, {2048, 2048}};
   std::vector<double> bitrates_mbps;  // H.264, atlas and meta together; none: nothing is coded
   double speed = 1;                   // of the path
+  uint32_t texture_mtexels = 1024;    // level 0 of texel shading's unique textures, Mi texels
 };
 LayoutStudySettings default_layout_study_settings();
 std::vector<std::string> layout_study_options();

@@ -39,13 +39,13 @@ uint32_t longest(bool masked) {
 // Before the size is held back by that of the last frame.
 RectangleSize wish(const RectangleNeed& need, bool masked, float scale) {
   const bool u_is_short = need.u <= need.v;
-  const float short_side = scale * (u_is_short ? need.u : need.v);
-  const float long_side = scale * (u_is_short ? need.v : need.u);
-  const uint16_t width = kWidthTable.nearest[even(short_side, longest(masked)) / 2];
+  const float short_intervals = scale * (u_is_short ? need.u : need.v);
+  const float long_intervals = scale * (u_is_short ? need.v : need.u);
+  const uint16_t width = kWidthTable.nearest[even(short_intervals + 1, longest(masked)) / 2];
   // The length makes up for the width's rounding, so that the area stays. A sliver pays for its two texels of
   // width with its length: otherwise slivers would hold texels that wide patches make more of.
-  const float excess = std::min(short_side / static_cast<float>(width), 1.25f);
-  uint16_t length = even(long_side * excess, longest(masked));
+  const float excess = std::min(short_intervals / static_cast<float>(width - 1), 1.25f);
+  uint16_t length = even(long_intervals * excess + 1, longest(masked));
   length = std::max(length, width);
   return u_is_short ? RectangleSize{width, length} : RectangleSize{length, width};
 }

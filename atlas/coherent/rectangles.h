@@ -9,7 +9,7 @@
 
 namespace tessera::atlas::coherent {
 
-// What a patch asks for before bias: texels along its axes, of the colour part.
+// What a patch asks for before bias: intervals between samples along its axes, of the colour part.
 struct RectangleNeed {
   float u = 0, v = 0;
   float area = 0;  // u * v
