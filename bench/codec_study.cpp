@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "base/camera_path.h"
 #include "bench/shading_streamer.h"
+#include "bench/truth_source.h"
 #include "codec/atlas_decoder.h"
 #include "codec/atlas_encoder.h"
 #include "codec/yuv.h"
@@ -19,7 +21,7 @@ namespace {
 
 constexpr uint32_t kMcu = 16;
 constexpr uint32_t kGap = 64;      // side of the squares of the half that is empty
-constexpr uint32_t kPictures = 3;  // server frames of the scene
+constexpr uint32_t kPictures = 4;  // server frames of the scene
 constexpr std::array kCodecs = {AtlasCodec::h264, AtlasCodec::jpeg};
 constexpr double kMtexel = 1 << 20;
 
@@ -109,8 +111,30 @@ Quality quality(const YuvImage& original, const YuvView& decoded, const codec::O
   return {sum / samples, psnr_db(squares / (samples * 255 * 255))};
 }
 
+struct Duration {
+  double wall_ms = 0, cpu_ms = 0;
+};
+
+// By the clock on the wall and by that of all the process's threads.
+class Watch {
+ public:
+  Duration lap() {
+    const TimeNs now = clock_.now();
+    const std::clock_t cpu_now = std::clock();
+    const Duration out{to_ms(now - std::exchange(wall_, now)),
+                       1e3 * static_cast<double>(cpu_now - std::exchange(cpu_, cpu_now)) / CLOCKS_PER_SEC};
+    return out;
+  }
+
+ private:
+  SteadyClock clock_;
+  TimeNs wall_ = clock_.now();
+  std::clock_t cpu_ = std::clock();
+};
+
 struct Coded {
-  double encode_ms = 0, decode_ms = 0, bits = 0;
+  Duration encode, decode;
+  double bits = 0;
   YuvView picture;  // the decoder's
 };
 
@@ -132,15 +156,13 @@ struct Coder {
   }
 
   StatusOr<Coded> run(const YuvImage& picture, const codec::Occupancy& used, double bits) {
-    const SteadyClock clock;
     const codec::AtlasPicture input(codec::view_of(picture), &used);
-    const TimeNs begin = clock.now();
+    Watch watch;
     TESSERA_ASSIGN_OR_RETURN(const codec::AccessUnit unit, encoder->encode(next, input, bits, next == 0));
-    const TimeNs encoded = clock.now();
+    const Duration encoded = watch.lap();
     TESSERA_ASSIGN_OR_RETURN(const codec::DecodedFrame frame, decoder->decode(unit.bytes));
     ++next;
-    return Coded{to_ms(encoded - begin), to_ms(clock.now() - encoded),
-                 8.0 * static_cast<double>(unit.bytes.size()), frame.picture};
+    return Coded{encoded, watch.lap(), 8.0 * static_cast<double>(unit.bytes.size()), frame.picture};
   }
 };
 
@@ -151,12 +173,13 @@ class SizeStudy {
       : settings_(settings), size_(atlas_size(mtexels)), result_(result) {}
 
   // By one codec from server to client; the first time also keeps the atlases.
-  Status stream(std::shared_ptr<server::SharedScene> scene, const CameraPath& path, AtlasCodec codec);
+  Status stream(std::shared_ptr<server::SharedScene> scene, const CameraPath& path, TruthSource& truth,
+                AtlasCodec codec);
   Status code();
 
  private:
   struct Measured {
-    std::vector<double> encode_ms, decode_ms;
+    std::vector<double> encode_ms, decode_ms, encode_cpu_ms, decode_cpu_ms;
     double bits = 0, ssim = 0, psnr = 0;
   };
 
@@ -178,8 +201,22 @@ void SizeStudy::keep_atlas(const server::Session& session) {
   fill_up(atlases_.emplace_back(copy_of(session.yuv())), used);
 }
 
+// The client's picture of the newest frame, coded and not, is compared with each other and with the truth.
+Status add_picture(ShadingStreamer& streamer, const View& view, const Image8& truth, CodecPictureRow& row) {
+  constexpr double kShare = 1.0 / (kPictures - 1);
+  TESSERA_ASSIGN_OR_RETURN(const Image8 uncoded, streamer.draw_uncoded(view));
+  TESSERA_ASSIGN_OR_RETURN(const Image8 coded, streamer.draw(view));
+  const ImageError error = compare_luma(uncoded, coded);
+  row.mssim += kShare * error.mssim;
+  row.psnr += kShare * error.psnr;
+  row.truth_uncoded += kShare * compare_luma(truth, uncoded).mssim;
+  row.truth_coded += kShare * compare_luma(truth, coded).mssim;
+  return absl::OkStatus();
+}
+
+// The first frame, which is a key frame, is sent but not counted.
 Status SizeStudy::stream(std::shared_ptr<server::SharedScene> scene, const CameraPath& path,
-                         AtlasCodec codec) {
+                         TruthSource& truth, AtlasCodec codec) {
   LoopbackSettings s = settings_.common;
   s.atlas = size_;
   s.codec = codec;
@@ -195,35 +232,36 @@ Status SizeStudy::stream(std::shared_ptr<server::SharedScene> scene, const Camer
         const std::vector<Packet> packets,
         streamer->serve(
             {.number = n, .poses = {&pose, 1}, .round_trip_ns = 100 * kNsPerMs, .scene_time_ns = now}));
+    double mbits = 0;
     for (const Packet& packet : packets) {
       TESSERA_RETURN_IF_ERROR(streamer->deliver(packet.channel, packet.bytes));
-      if (packet.channel == Channel::atlas) row.mbits = 8e-6 * static_cast<double>(packet.bytes.size());
+      if (packet.channel == Channel::atlas) mbits = 8e-6 * static_cast<double>(packet.bytes.size());
     }
     if (first_codec) keep_atlas(streamer->session());
     if (streamer->newest_frame() != n)
       return absl::InternalError(
           absl::StrCat("frame ", n, " by ", std::string(name_of(codec)), " did not arrive"));
+    if (n == 0) continue;
+    row.mbits = std::max(row.mbits, mbits);
     View view = client_view(s);
     view.pose = pose.pose;
-    TESSERA_ASSIGN_OR_RETURN(const Image8 uncoded, streamer->draw_uncoded_420(view));
-    TESSERA_ASSIGN_OR_RETURN(const Image8 coded, streamer->draw(view));
-    const ImageError error = compare_luma(uncoded, coded);
-    row.mssim = error.mssim;
-    row.psnr = error.psnr;
+    TESSERA_ASSIGN_OR_RETURN(const RenderedImage reference, truth.truth(view, now));
+    TESSERA_RETURN_IF_ERROR(add_picture(*streamer, view, reference->color, row));
   }
   row.used = static_cast<double>(streamer->last_stats().layout.used_texels) / texels();
   result_.pictures.push_back(row);
   return absl::OkStatus();
 }
 
-// Key frames, so that no picture before helps; the scale of budgets is bisected.
+// Key frames, so that no picture before helps; the scale of budgets is bisected. Both pictures are judged by
+// the texels that both have, so that one's are not harder than the other's.
 StatusOr<double> SizeStudy::equal_quality_share(AtlasCodec codec) {
   const auto code_once = [&](double fill, double bits, double& spent) -> StatusOr<double> {
     TESSERA_ASSIGN_OR_RETURN(Coder coder, Coder::create(codec, size_, settings_.common.server_fps, bits));
     const codec::Occupancy used = occupancy(size_, fill);
     TESSERA_ASSIGN_OR_RETURN(const Coded coded, coder.run(atlases_[0], used, bits));
     spent = coded.bits;
-    return quality(atlases_[0], coded.picture, used).psnr;
+    return quality(atlases_[0], coded.picture, occupancy(size_, 0.5)).psnr;
   };
   const double budget = settings_.bits_per_texel * texels();
   double full_bits = 0, half_bits = 0;
@@ -256,12 +294,14 @@ void SizeStudy::add_rows(AtlasCodec codec, std::span<const Measured> by_fill, do
     CodecRow row{.codec = codec, .width = size_.width, .height = size_.height, .fill = kFills[i]};
     row.encode_ms_per_mtexel = per_mtexel(m.encode_ms, texels());
     row.decode_ms_per_mtexel = per_mtexel(m.decode_ms, texels());
+    row.encode_cpu_ms_per_mtexel = per_mtexel(m.encode_cpu_ms, texels());
+    row.decode_cpu_ms_per_mtexel = per_mtexel(m.decode_cpu_ms, texels());
     row.bits_per_sample = m.bits / (kFills[i] * texels() * settings_.rounds);
     row.ssim = m.ssim;
     row.psnr = m.psnr;
     if (i > 0) {
-      row.encode_time_share = median_ratio(m.encode_ms, by_fill[0].encode_ms);
-      row.decode_time_share = median_ratio(m.decode_ms, by_fill[0].decode_ms);
+      row.encode_time_share = median_ratio(m.encode_cpu_ms, by_fill[0].encode_cpu_ms);
+      row.decode_time_share = median_ratio(m.decode_cpu_ms, by_fill[0].decode_cpu_ms);
       row.equal_quality_share = equal_quality_share;
     }
     result_.rows.push_back(row);
@@ -285,8 +325,10 @@ Status SizeStudy::code() {
         TESSERA_ASSIGN_OR_RETURN(const Coded coded, coders[c][f]->run(picture, used, bits));
         if (round == 0) continue;
         Measured& m = measured[c][f];
-        m.encode_ms.push_back(coded.encode_ms);
-        m.decode_ms.push_back(coded.decode_ms);
+        m.encode_ms.push_back(coded.encode.wall_ms);
+        m.decode_ms.push_back(coded.decode.wall_ms);
+        m.encode_cpu_ms.push_back(coded.encode.cpu_ms);
+        m.decode_cpu_ms.push_back(coded.decode.cpu_ms);
         m.bits += coded.bits;
         const Quality q = quality(picture, coded.picture, used);
         m.ssim += q.ssim / settings_.rounds;
@@ -310,6 +352,8 @@ nlohmann::json to_json(const CodecRow& row) {
                         {"fill", row.fill},
                         {"encode_ms_per_mtexel", to_json(row.encode_ms_per_mtexel)},
                         {"decode_ms_per_mtexel", to_json(row.decode_ms_per_mtexel)},
+                        {"encode_cpu_ms_per_mtexel", to_json(row.encode_cpu_ms_per_mtexel)},
+                        {"decode_cpu_ms_per_mtexel", to_json(row.decode_cpu_ms_per_mtexel)},
                         {"bits_per_sample", row.bits_per_sample},
                         {"ssim", row.ssim},
                         {"psnr", row.psnr}};
@@ -325,7 +369,9 @@ nlohmann::json to_json(const CodecPictureRow& row) {
           {"used", row.used},
           {"mbits", row.mbits},
           {"mssim", row.mssim},
-          {"psnr", row.psnr}};
+          {"psnr", row.psnr},
+          {"mssim_truth_uncoded", row.truth_uncoded},
+          {"mssim_truth_coded", row.truth_coded}};
 }
 
 }  // namespace
@@ -350,13 +396,14 @@ StatusOr<CodecStudyResult> run_codec_study(const CodecStudySettings& settings, P
   TESSERA_ASSIGN_OR_RETURN(const auto scene, scene::load_scene(settings.common.scene));
   TESSERA_ASSIGN_OR_RETURN(const CameraPath path, scene::load_path(settings.common.path));
   TESSERA_ASSIGN_OR_RETURN(const auto shared, server::SharedScene::create(device, scene));
+  TESSERA_ASSIGN_OR_RETURN(const auto truth, TruthSource::create(shared, settings.common.scene, "none", 4));
   uint64_t steps = 0;
   for (const uint32_t mtexels : settings.mtexels) steps += (kCodecs.size() + 1) * mtexels;
   progress.begin("Mi texels", steps);
   for (const uint32_t mtexels : settings.mtexels) {
     SizeStudy study(settings, mtexels, result);
     for (const AtlasCodec codec : kCodecs) {
-      TESSERA_RETURN_IF_ERROR(study.stream(shared, path, codec));
+      TESSERA_RETURN_IF_ERROR(study.stream(shared, path, *truth, codec));
       progress.advance(mtexels);
     }
     TESSERA_RETURN_IF_ERROR(study.code());

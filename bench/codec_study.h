@@ -21,19 +21,22 @@ struct CodecRow {
   uint32_t width = 0, height = 0;
   double fill = 1;                                         // share of the texels that hold samples
   Percentiles encode_ms_per_mtexel, decode_ms_per_mtexel;  // of the whole atlas, by the clock on the wall
+  Percentiles encode_cpu_ms_per_mtexel, decode_cpu_ms_per_mtexel;  // of all threads together
   double bits_per_sample = 0;
   double ssim = 0, psnr = 0;  // luma of the decoded atlas, over its samples
-  // Half empty against full: median of the rounds' time ratios; bits of a picture that is as good (PSNR).
+  // Half empty against full: median of the rounds' ratios of processor time, which other load on the machine
+  // hardly changes; bits of a picture that is as good (PSNR).
   std::optional<double> encode_time_share, decode_time_share, equal_quality_share;
 };
 
-// The client's picture, the atlas as the session lays it out.
+// The client's picture, the atlas as the session lays it out; means over a few frames.
 struct CodecPictureRow {
   AtlasCodec codec = AtlasCodec::h264;
-  uint32_t width = 0, height = 0;  // of the atlas
-  double used = 0;                 // share of its texels
-  double mbits = 0;                // of the atlas, of this frame
-  double mssim = 0, psnr = 0;      // against the picture of the atlas before coding
+  uint32_t width = 0, height = 0;             // of the atlas
+  double used = 0;                            // share of its texels
+  double mbits = 0;                           // of the atlas: the largest of the frames
+  double mssim = 0, psnr = 0;                 // against the picture of the atlas before coding
+  double truth_uncoded = 0, truth_coded = 0;  // mssim of both against the forward reference renderer
 };
 
 struct CodecStudyResult {

@@ -31,7 +31,12 @@ TEST(CodecStudy, EmptySquaresAreSparedByJpegAndEveryRowIsFilledIn) {
     }
   }
   ASSERT_EQ(result->pictures.size(), 2u);
-  for (const CodecPictureRow& row : result->pictures) EXPECT_GT(row.mssim, 0.8);
+  for (const CodecPictureRow& row : result->pictures) {
+    EXPECT_GT(row.mssim, 0.8);
+    EXPECT_LE(row.mbits, 0.5 * (1 << 20) / 1e6 * (row.codec == AtlasCodec::jpeg ? 1 : 1.5));
+    EXPECT_GT(row.truth_coded, 0.8);
+    EXPECT_GT(row.truth_uncoded, row.truth_coded);
+  }
   const nlohmann::json json = to_json(*result);
   EXPECT_EQ(json["rows"].size(), 4u);
   EXPECT_EQ(json["settings"]["mtexels"], settings.mtexels);
