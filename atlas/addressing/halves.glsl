@@ -22,14 +22,16 @@ struct HalfPoint {
   float out_along;
 };
 
-// `base` = the coordinate of the base's second corner, `up` = that of the apex; those beside the triangle are moved into it.
+// `base` = the coordinate of the base's second corner, `up` = that of the apex. Points beside the triangle are moved into it
+// along its height, so that they keep their place along the base: a pixel's centre may lie many heights away from a sliver that
+// its samples hit.
 INLINE HalfPoint half_point(float base, float up, float foot) {
   HalfPoint at;
-  at.up = clamp(up, 0.0f, 1.0f);
-  float from_foot = base - foot * (1.0f - at.up);
+  float from_foot = base - foot * (1.0f - up);
   at.half_number = from_foot < 0.0f ? 0 : 1;
   float part = from_foot < 0.0f ? -from_foot / foot : from_foot / (1.0f - foot);
-  at.out_along = min(part, 1.0f - at.up);
+  at.out_along = min(part, 1.0f);
+  at.up = clamp(up, 0.0f, 1.0f - at.out_along);
   return at;
 }
 

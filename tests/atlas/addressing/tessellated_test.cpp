@@ -1,6 +1,7 @@
 // Splits, steps of the L, and halves: what layout `tessellated` adds to L-packing and Oversampling.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "atlas/addressing/addressing.h"
@@ -126,6 +127,23 @@ TEST(Halves, PointsBesideTheTriangleAreMovedIntoIt) {
         const HalfPoint at = half_point(base, up, foot_from_code(code));
         EXPECT_TRUE(at.up >= 0 && at.out_along >= 0 && at.up + at.out_along <= 1 + 1e-6f);
       }
+}
+
+// A pixel's centre may lie many heights beside a sliver.
+TEST(Halves, PointsBesideTheTriangleKeepTheirPlaceAlongTheBase) {
+  for (const int code : {0, 20, 63}) {
+    const float foot = foot_from_code(code);
+    for (float along = 0; along <= 1; along += 0.05f) {
+      const float top = std::min(along / foot, (1 - along) / (1 - foot));
+      for (const float up : {-7.0f, -0.3f, 0.3f * top, top, 0.3f + top, 9.0f}) {
+        const HalfPoint at = half_point(along - foot * up, up, foot);
+        const float shown =
+            at.half_number == 0 ? foot * (1 - at.out_along) : foot + (1 - foot) * at.out_along;
+        EXPECT_NEAR(shown, along, 1e-5f) << foot << " " << up;
+        EXPECT_NEAR(at.up, std::clamp(up, 0.0f, top), 1e-3f) << foot << " " << along;
+      }
+    }
+  }
 }
 
 }  // namespace
