@@ -17,8 +17,10 @@ uniform highp sampler2D vertices;
 uniform highp sampler2D transforms;
 uniform mat4 clip_from_relative;
 
-// Block: texel within it, and 1; L and halves: the corner's weights; times the corner's distance from the eye that it is for.
-out vec3 spaced;
+// Block: texel within it, and 1; L and halves: the corner's weights.
+out vec3 even;
+out vec3 spaced;                // times the corner's distance from the eye that it is for
+flat out vec2 reach;            // the least and the largest of the three distances
 flat out int form;              // as below
 flat out uvec4 place;           // of an L and of halves: the record's shape
 flat out vec2 origin;           // of the block, in texels
@@ -45,8 +47,7 @@ void set_block(uvec4 shape, uint what, int corner) {
   if ((what >> 27 & 1u) != 0u) position = position.yx;
   vec2 extent = vec2(block_color_size(size, masked) - 1);
   last = extent + 0.5;
-  // Interpolated on the surface, then divided: even on the screen of that eye (TSS eq. 5).
-  spaced = distance_of(shape, corner) * vec3(block_corner_texel(position, extent) + 0.5, 1.0);
+  even = vec3(block_corner_texel(position, extent) + 0.5, 1.0);
   coverage_offset = masked ? vec2(block_coverage_offset(size)) : vec2(0.0);
 }
 
@@ -69,7 +70,9 @@ void main() {
   int kind = int(what >> 24 & 7u);
   form = kFormBlock;
   place = shape;
-  spaced = vec3(0.5, 0.5, 1.0);
+  even = vec3(0.5, 0.5, 1.0);
+  spaced = even;
+  reach = vec2(1.0);
   origin = vec2(0.0);
   last = vec2(0.5);
   coverage_offset = vec2(0.0);
@@ -80,8 +83,13 @@ void main() {
     set_block(shape, what, corner);
   } else {
     form = kind;
-    spaced = vec3(corner == 0, corner == 1, corner == 2) * distance_of(shape, corner);
+    even = vec3(corner == 0, corner == 1, corner == 2);
   }
+  // Interpolated on the surface, then divided: even on the screen of that eye (TSS eq. 5).
+  vec3 distances = vec3(distance_of(shape, 0), distance_of(shape, 1), distance_of(shape, 2));
+  spaced = distances[corner] * even;
+  reach.x = min(distances.x, min(distances.y, distances.z));
+  reach.y = max(distances.x, max(distances.y, distances.z));
 }
 )";
 
@@ -93,7 +101,9 @@ uniform vec2 atlas_size;
 uniform bool masked;
 uniform bool multisampled;
 
+in vec3 even;
 in vec3 spaced;
+flat in vec2 reach;
 flat in int form;
 flat in uvec4 place;
 flat in vec2 origin;
@@ -111,25 +121,33 @@ struct Places {
   vec2 coverage;
 };
 
-// At a pixel whose centre lies outside the triangle interpolation may leave the shape, and its divisor may even vanish. Not
-// `centroid`: thin triangles share most of their pixels, and each would be sampled elsewhere than where the pixel shows it.
+// At a pixel whose centre lies outside the triangle interpolation may leave the shape, and what it is divided by may vanish:
+// where it is not between those of the corners, samples count as evenly spaced. Not `centroid`: thin triangles share most of
+// their pixels, and each would be sampled elsewhere than where the pixel shows it.
+bool is_between(float distance) { return distance >= reach.x && distance <= reach.y; }
+
 Places in_block() {
   Places at;
-  at.color = origin + clamp(spaced.xy / max(spaced.z, 1e-6), vec2(0.5), last);
+  at.color = origin + clamp(is_between(spaced.z) ? spaced.xy / spaced.z : even.xy, vec2(0.5), last);
   at.coverage = at.color + coverage_offset;
   return at;
 }
 
 vec3 on_grid() {
-  vec3 inside = max(spaced, 0.0);
-  return inside / max(inside.x + inside.y + inside.z, 1e-6);
+  float sum = spaced.x + spaced.y + spaced.z;
+  return is_between(sum) ? spaced / sum : even;
+}
+
+vec3 in_triangle(vec3 grid) {
+  vec3 inside = max(grid, 0.0);
+  return inside / (inside.x + inside.y + inside.z);  // at least 1: the three make 1
 }
 
 Places in_l() {
   int level = int(place.x >> 24 & 63u) + 1;
   ivec2 first = 2 * ivec2(uvec2(place.x, place.x >> 12) & 0xfffu);
   bool split = place.x >> 31 != 0u;
-  SplitPoint point = split_point(on_grid(), split ? int(place.y & 0xffu) : 1);
+  SplitPoint point = split_point(in_triangle(on_grid()), split ? int(place.y & 0xffu) : 1);
   // Number of the half pair.
   int number = masked ? 2 * point.index : point.index + int(place.x >> 30 & 1u);
   vec2 pair = vec2(l_pair_place(number / 2, first, 2 * int(place.y >> 8), level, int(atlas_size.x))) + 0.5;
@@ -141,7 +159,7 @@ Places in_l() {
 }
 
 Places in_halves() {
-  vec3 grid = on_grid();
+  vec3 grid = on_grid();  // half_point() moves it into the triangle
   int apex = int(place.x >> 26 & 3u);
   HalfPoint point = half_point(grid[(apex + 2) % 3], grid[apex], foot_from_code(int(place.y >> 26)));
   uint half_place = point.half_number == 0 ? place.x : place.y;

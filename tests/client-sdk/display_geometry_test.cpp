@@ -107,6 +107,36 @@ TEST(Geometry, PixelsSharedByThinPatchesAreSampledAtTheirCentres) {
   }
 }
 
+// The same for thinner strips of which one edge was four times as far as the other from the eye that they
+// were placed for: pixels' centres lie beyond its horizon, where interpolated distances vanish or are
+// negative.
+TEST(Geometry, PixelsBesideStripsThatWerePlacedAtASlantKeepTheirPlaceAlongThem) {
+  constexpr float kHalfLength = 1.5f, kRise = 0.008f;
+  constexpr int8_t kFourTimes = 42;
+  auto display = make_display(kSide);
+  for (const bool upper_is_far : {false, true}) {
+    SceneBuilder scene;
+    const uint32_t object = scene.object();
+    const int8_t code = upper_is_far ? kFourTimes : -kFourTimes;
+    for (float y = -kHalfLength; y < kHalfLength; y += kRise) {
+      scene.block(scene.rectangle(object, -kHalfLength, y, kHalfLength, y + kRise, -1), 0, 0, 5, 1);
+      scene.meta().placements.back().spacing = {0, code, code, 0};  // of corners 1, 2, 3
+    }
+    const Image8 image = picture_of(*display, scene.state(), ramp_atlas(), square_view(kSide));
+    for (uint32_t y = 2; y < kSide - 2; ++y) {
+      for (uint32_t x = 2; x < kSide - 2; ++x) {
+        // Samples are spaced by 1 : 4 in each triangle: within it the place on the grid lies between these.
+        const float center = (static_cast<float>(x) + 0.5f) * (2.0f / kSide) - 1.0f;
+        const float even = (center + kHalfLength) / (2 * kHalfLength);
+        const float left = upper_is_far ? even / (4 - 3 * even) : even;
+        const float right = upper_is_far ? even : 1 - (1 - even) / (1 + 3 * even);
+        ASSERT_GE(pixel(image, x, y).r, 248 * left - 2) << x << "," << y << " " << upper_is_far;
+        ASSERT_LE(pixel(image, x, y).r, 248 * right + 2) << x << "," << y << " " << upper_is_far;
+      }
+    }
+  }
+}
+
 TEST(Geometry, NearerSurfacesHideFartherOnesInAnyOrder) {
   auto display = make_display(kSide);
   // Distances and gaps that a fixed-point depth buffer would not tell apart.
