@@ -10,6 +10,7 @@ namespace tessera::scene {
 namespace {
 
 constexpr uint64_t kMaxInstances = 10'000'000;
+constexpr double kMaxCoordinate = 1e30;  // of positions and in the world: differences stay finite in float
 constexpr const char* kAttributes[] = {"POSITION",   "NORMAL",     "TANGENT",
                                        "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"};
 enum Attribute : size_t { position, normal, tangent, texcoord0, texcoord1, color0, attribute_count };
@@ -26,6 +27,10 @@ struct GeometryKey {
   std::array<float, 6> normal_map_transform;  // likewise
   auto operator<=>(const GeometryKey&) const = default;
 };
+
+double largest(const vec3& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
 
 uint32_t pack_color(const vec4& c) {
   uint32_t packed = 0;
@@ -151,6 +156,9 @@ class PrimitiveReader {
       const vec4 value = view.read(used[i]) + vec4(0.f);  // -0 becomes 0, so that equal vertices weld
       if (!is_finite(value))
         return document_.error(accessor_path(accessor), absl::StrFormat("element %d is not finite", used[i]));
+      if (attribute == position && largest(vec3(value)) > kMaxCoordinate)
+        return document_.error(accessor_path(accessor),
+                               absl::StrFormat("element %d exceeds %g", used[i], kMaxCoordinate));
       set(attribute, value, view.components(), mesh.vertices[i]);
     }
     return absl::OkStatus();
@@ -277,6 +285,9 @@ class MeshImporter {
     read.name = source.primitives.size() > 1 ? absl::StrCat(source.name, "/", p) : source.name;
     prepare(read, reader, scene_.materials[material].normal_texture);
     geometries_[key] = static_cast<uint32_t>(meshes_.size());
+    double reach = 0;
+    for (const Vertex& v : read.vertices) reach = std::max(reach, largest(v.position));
+    reaches_.push_back(reach);
     meshes_.push_back(std::move(read));
     return static_cast<uint32_t>(meshes_.size() - 1);
   }
@@ -326,7 +337,6 @@ class MeshImporter {
   }
 
   Status check_world(const Instance& instance, const dmat4& world) const {
-    constexpr double kMaxCoordinate = 1e30;  // squares stay finite in float after subtracting an origin
     for (int c = 0; c < 4; ++c) {
       for (int r = 0; r < 3; ++r) {
         if (std::abs(world[c][r]) <= kMaxCoordinate) continue;
@@ -335,6 +345,11 @@ class MeshImporter {
                                       scene_.nodes[instance.node].name, kMaxCoordinate));
       }
     }
+    double scale = 0;
+    for (int c = 0; c < 3; ++c) scale = std::max(scale, glm::length(dvec3(world[c])));
+    if (scale * reaches_[instance.geometry] > kMaxCoordinate)
+      return document_.error("/nodes", absl::StrFormat("node \"%s\" places its mesh beyond %g",
+                                                       scene_.nodes[instance.node].name, kMaxCoordinate));
     return absl::OkStatus();
   }
 
@@ -391,6 +406,7 @@ class MeshImporter {
   ImportNotes& notes_;
   std::map<GeometryKey, uint32_t> geometries_;
   std::vector<SourceMesh> meshes_;  // by geometry
+  std::vector<double> reaches_;     // by geometry: largest coordinate
   std::vector<uint64_t> instance_counts_;
   uint64_t unique_triangles_ = 0, degenerate_ = 0, skipped_modes_ = 0, flat_instances_ = 0;
 };

@@ -161,6 +161,13 @@ const std::vector<Fault> kFaults = {
     {"mode", [](auto& b) { b.document["meshes"][0]["primitives"][0]["mode"] = 7; },
      "/meshes/0/primitives/0/mode"},
     {"NaN position", [](auto& b) { set_float(b, 0, 7, kNan); }, "/accessors/0: element 2 is not finite"},
+    {"huge position", [](auto& b) { set_float(b, 0, 7, -3e38f); }, "/accessors/0: element 2 exceeds 1e+30"},
+    {"huge mesh",
+     [](auto& b) {
+       for (const size_t k : {3, 6, 7, 10}) set_float(b, 0, k, 1e20f);
+       b.document["nodes"][1]["scale"] = {1e15, 1e15, 1e15};
+     },
+     "/nodes: node \"a\" places its mesh beyond 1e+30"},
     {"Inf normal", [](auto& b) { set_float(b, 1, 0, kInf); }, "/accessors/1: element 0 is not finite"},
     {"NaN uv", [](auto& b) { set_float(b, 2, 3, kNan); }, "/accessors/2: element 1 is not finite"},
     // Nodes
