@@ -18,6 +18,7 @@
 #include "bench/memory.h"
 #include "bench/report.h"
 #include "bench/spatial.h"
+#include "bench/stability.h"
 #include "bench/version.h"
 
 namespace {
@@ -28,9 +29,10 @@ enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2 };
 
 constexpr char kFooter[] =
     R"(Configuration: every option is also an environment variable (--delay-ms = TESSERA_BENCH_DELAY_MS) and a key
-of the --config file, under [loopback], [culling], [memory], [spatial], [codec] or [gather]. Flags win over the file, the file over the environment.
+of the --config file, under [loopback], [culling], [memory], [spatial], [codec], [gather], [layouts] or [stability].
+Flags win over the file, the file over the environment.
 
-Exit codes: 0 done, 1 the run failed, 2 wrong usage.)";
+Exit codes: 0 done, 1 the run failed (of stability: a case did), 2 wrong usage.)";
 
 constexpr char kLoopbackFooter[] = R"(Examples:
   tessera-bench loopback --report report
@@ -54,6 +56,13 @@ constexpr char kCodecFooter[] = R"(Examples:
 
 Atlases of the scene are filled up with their own squares, so that every texel holds a sample, or every other square of
 64x64 is left empty; then both codecs code them in turn. The lower table is of the client's picture, the atlas as it is.)";
+
+constexpr char kStabilityFooter[] = R"(Examples:
+  tessera-bench stability --json stability.json
+  tessera-bench stability --cases sliver-1e7,t-junctions
+
+Each case goes from import to the client's picture, with each of the three layouts where that makes sense. An error is
+the largest difference of a colour (of 1), or a share of pixels or samples.)";
 
 constexpr char kMemoryFooter[] = R"(Examples:
   tessera-bench memory --frames 0 --json speed.json
@@ -206,7 +215,7 @@ int run_spatial(const bench::SpatialSettings& settings) {
 void print_summary(const bench::CodecStudyResult& result) {
   std::cout << absl::StrFormat("%-5s %-10s %5s %16s %16s %11s %7s %7s  %s\n", "codec", "atlas", "fill",
                                "encode ms/Mtexel", "decode ms/Mtexel", "bits/sample", "ssim", "psnr",
-                               "half empty / full: encode, decode, equal quality");
+                               "half empty / full: CPU to encode, to decode, bits of equal quality");
   for (const bench::CodecRow& row : result.rows) {
     std::cout << absl::StrFormat("%-5s %-10s %5.2f %16.2f %16.2f %11.3f %7.4f %7.2f",
                                  std::string(name_of(row.codec)), absl::StrCat(row.width, "x", row.height),
@@ -217,12 +226,13 @@ void print_summary(const bench::CodecStudyResult& result) {
                                    *row.equal_quality_share);
     std::cout << "\n";
   }
-  std::cout << absl::StrFormat("%-5s %-10s %5s %7s %7s %7s\n", "codec", "atlas", "used", "Mbit", "mssim",
-                               "psnr");
+  std::cout << absl::StrFormat("%-5s %-10s %5s %7s %7s %7s  %s\n", "codec", "atlas", "used", "Mbit", "mssim",
+                               "psnr", "against the truth: uncoded, coded");
   for (const bench::CodecPictureRow& row : result.pictures)
-    std::cout << absl::StrFormat("%-5s %-10s %5.2f %7.2f %7.4f %7.2f\n", std::string(name_of(row.codec)),
-                                 absl::StrCat(row.width, "x", row.height), row.used, row.mbits, row.mssim,
-                                 row.psnr);
+    std::cout << absl::StrFormat("%-5s %-10s %5.2f %7.3f %7.4f %7.2f  %.4f, %.4f\n",
+                                 std::string(name_of(row.codec)), absl::StrCat(row.width, "x", row.height),
+                                 row.used, row.mbits, row.mssim, row.psnr, row.truth_uncoded,
+                                 row.truth_coded);
 }
 
 int run_codec(const bench::CodecStudySettings& settings) {
@@ -268,6 +278,20 @@ int run_layouts(const bench::LayoutStudySettings& settings) {
   if (!written.ok()) return report_failure(written);
   std::cerr << "report: " << settings.common.report << "/layouts.html" << std::endl;
   return kOk;
+}
+
+int run_stability(const bench::StabilitySettings& settings) {
+  const SteadyClock clock;
+  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
+  StatusOr<bench::StabilityResult> result = bench::run_stability(settings, progress);
+  if (!result.ok()) return report_failure(result.status());
+  result->command = absl::StrCat(command_line("tessera-bench stability", settings.common),
+                                 " --sub-pixel-triangles=", settings.sub_pixel_triangles);
+  if (!settings.cases.empty())
+    absl::StrAppend(&result->command, " --cases=", absl::StrJoin(settings.cases, ","));
+  std::cout << bench::to_text(*result) << std::flush;
+  const int written = write_json(settings.common.json, *result);
+  return written != kOk ? written : result->passed() ? kOk : kFailed;
 }
 
 int run_report(const std::string& folder) {
@@ -346,9 +370,16 @@ int main(int argc, char** argv) {
   layouts->footer(kLayoutsFooter);
   layouts->fallthrough();
 
+  CLI::App* stability =
+      app.add_subcommand("stability", "extreme geometry and sampling, with the error of each case");
+  bench::StabilitySettings stability_settings;
+  bench::add_options(*stability, stability_settings);
+  stability->footer(kStabilityFooter);
+  stability->fallthrough();
+
   CLI::App* report = app.add_subcommand("report", "one page from all runs in a folder");
   std::string folder;
-  report->add_option("folder", folder, "where `loopback --report` left its runs")
+  report->add_option("folder", folder, "where `loopback --report` or `stability --json` left its runs")
       ->required()
       ->check(CLI::ExistingDirectory);
   report->footer("Example:\n  tessera-bench report report");
@@ -365,5 +396,6 @@ int main(int argc, char** argv) {
   if (codec->parsed()) return run_codec(codec_settings);
   if (gather->parsed()) return run_gather(gather_settings);
   if (layouts->parsed()) return run_layouts(layout_settings);
+  if (stability->parsed()) return run_stability(stability_settings);
   return spatial->parsed() ? run_spatial(spatial_settings) : run_report(folder);
 }

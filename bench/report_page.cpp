@@ -9,6 +9,7 @@
 #include "bench/html.h"
 #include "bench/image_io.h"
 #include "bench/report_plots.h"
+#include "bench/stability_page.h"
 
 namespace tessera::bench {
 namespace {
@@ -219,12 +220,18 @@ std::string run_html(const std::filesystem::path& folder, const json& run) {
 }  // namespace
 
 std::string report_page(const std::filesystem::path& folder, std::span<const json> runs) {
+  std::vector<json> loopback, stability;
+  for (const json& run : runs) (is_stability_run(run) ? stability : loopback).push_back(run);
   std::string html = page_head("Tessera: measured runs");
-  html +=
-      "<p class=\"soft\">The client's views beside the forward reference renderer. Means are over displayed "
-      "frames.</p>\n";
-  html += plots_html(plot_comparison(runs));
-  for (const json& run : runs) html += run_html(folder, run);
+  if (!loopback.empty()) {
+    html +=
+        "<p class=\"soft\">The client's views beside the forward reference renderer. Means are over "
+        "displayed "
+        "frames.</p>\n";
+    html += plots_html(plot_comparison(loopback));
+  }
+  for (const json& run : loopback) html += run_html(folder, run);
+  for (const json& run : stability) html += stability_html(run);
   return html + "</body>\n</html>\n";
 }
 

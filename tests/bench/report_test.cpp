@@ -9,6 +9,7 @@
 #include "bench/file_io.h"
 #include "bench/image_io.h"
 #include "bench/report_plots.h"
+#include "bench/stability.h"
 #include "bench/temporary_folder.h"
 #include "sample_result.h"
 
@@ -55,6 +56,31 @@ TEST(Report, OnePageWithTablesPicturesAndCauses) {
   EXPECT_THAT(html, HasSubstr("<td>0.8765</td>"));
   EXPECT_THAT(html, HasSubstr("enlarged twice"));
   EXPECT_EQ(count(html, "<h2>"), 1u);
+}
+
+StabilityResult sample_stability() {
+  StabilityResult result{.command = "tessera-bench stability"};
+  StabilityRow row{
+      .of = {.group = "geometry", .name = "sliver", .input = "thin & long", .expected = "", .run = {}}};
+  row.measures = {{"colour, blocks", 0.25, 0.5, "rounding"}, {"holes, blocks", NAN, 0, "none"}};
+  result.rows = {row};
+  return result;
+}
+
+TEST(Report, TheStabilityCatalogueHasATableOfItsOwn) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_file(folder.path() / "stability.json", to_json(sample_stability()).dump()).ok());
+  ASSERT_TRUE(write_report(folder.path()).ok());
+  const std::string alone = page(folder.path());
+  EXPECT_THAT(alone,
+              HasSubstr("<td>colour, blocks</td><td>0.25</td><td>0.5</td><td>rounding</td><td>pass</td>"));
+  EXPECT_THAT(alone, HasSubstr("<td>not a number</td>"));
+  EXPECT_THAT(alone, HasSubstr("thin &amp; long"));
+  EXPECT_EQ(count(alone, "<b>FAIL</b>"), 3u) << "the measure, the case and the whole";
+
+  ASSERT_TRUE(write_run(folder.path(), sample_result()).ok());
+  ASSERT_TRUE(write_report(folder.path()).ok());
+  EXPECT_EQ(count(page(folder.path()), "<h2>"), 2u);
 }
 
 TEST(Report, ASceneWithoutMaskedMaterialsHasNoSuchColumn) {
