@@ -12,6 +12,7 @@ namespace {
 constexpr uint32_t kMaxSide = 8192;  // texels
 constexpr uint64_t kStages = 16;     // of re-placing the atlas: a frame moves at most this part of it
 constexpr float kFullest = 0.75f;    // slabs with a larger share in use are not worth emptying
+constexpr int kFirstTries = 16;      // to find a place for all in the first frame
 constexpr int kPauseFrames = 15;     // between two stages that helped nobody
 
 Status check(const LayoutSettings& s) {
@@ -35,6 +36,8 @@ struct Layout::Impl {
       : scene(s), settings(l), traits(s), slabs(l.width, l.height), target(l.width * double(l.height)) {}
 
   LayoutDelta update(const LayoutInput& input);
+  void place(const LayoutInput& input);
+  void fit_first_frame(const LayoutInput& input);
   void follow_bias(const scene::VisiblePatches& visible);
   void choose(const LayoutInput& input);
   void choose_one(scene::PatchId patch, const Wanted& wanted, const Placement* was, const Spacing& spacing);
@@ -63,14 +66,32 @@ struct Layout::Impl {
 };
 
 LayoutDelta Layout::Impl::update(const LayoutInput& input) {
-  follow_bias(input.visible);
-  choose(input);
-  allocate();
+  place(input);
+  if (before.empty()) fit_first_frame(input);
   slabs.reopen();
   const LayoutDelta delta = difference(before, now);
   count(delta);
   plan_next_frame();
   return delta;
+}
+
+void Layout::Impl::place(const LayoutInput& input) {
+  follow_bias(input.visible);
+  choose(input);
+  allocate();
+}
+
+// Nothing is shown yet that could move: until all have a place, starts anew with a smaller target. Few large
+// rectangles leave more room unused than the target allows for.
+void Layout::Impl::fit_first_frame(const LayoutInput& input) {
+  const float max_bias = settings.levels.max_bias;
+  for (int tries = 0; !starved.empty() && stats.bias < max_bias && tries < kFirstTries; ++tries) {
+    target.on_out_of_memory();
+    slabs = Slabs(settings.width, settings.height);
+    bias = {};
+    now.clear();
+    place(input);
+  }
 }
 
 void Layout::Impl::follow_bias(const scene::VisiblePatches& visible) {

@@ -133,6 +133,17 @@ TEST_F(CoherentLayout, SpacingIsFrozenWhileItIsGood) {
   EXPECT_TRUE(after.x == before.x && after.y == before.y && after.width == before.width);
 }
 
+// Of few large rectangles a slab holds one, and what is left of it serves none of the others.
+TEST_F(CoherentLayout, TheFirstFrameFindsAPlaceForAll) {
+  for (const float side : {90.0f, 140.0f, 190.0f}) {
+    mirror_.clear();
+    make(60, {.width = 1024, .height = 512});
+    update(rectangles(60, side, 1.2f * side));
+    EXPECT_EQ(layout_->stats().colors_out_of_memory, 0u) << side;
+    EXPECT_GT(layout_->stats().used_texels, 1024u * 512 / 2) << side;
+  }
+}
+
 TEST_F(CoherentLayout, AFullAtlasFallsBackToColorsAndRecovers) {
   make(2000, {.width = 256, .height = 256, .levels = {.max_bias = 0}});
   update(rectangles(2000, 20, 20));
