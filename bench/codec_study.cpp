@@ -7,13 +7,12 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
-#include "base/camera_path.h"
 #include "bench/shading_streamer.h"
+#include "bench/study_scene.h"
 #include "bench/truth_source.h"
 #include "codec/atlas_decoder.h"
 #include "codec/atlas_encoder.h"
 #include "codec/yuv.h"
-#include "scene/procedural.h"
 #include "server/sample_map.h"
 
 namespace tessera::bench {
@@ -342,10 +341,6 @@ Status SizeStudy::code() {
   return absl::OkStatus();
 }
 
-nlohmann::json to_json(const Percentiles& p) {
-  return {{"p50", p.p50}, {"p95", p.p95}, {"p99", p.p99}};
-}
-
 nlohmann::json to_json(const CodecRow& row) {
   nlohmann::json out = {{"codec", name_of(row.codec)},
                         {"atlas", absl::StrCat(row.width, "x", row.height)},
@@ -390,20 +385,17 @@ nlohmann::json to_json(const CodecStudyResult& result) {
 
 StatusOr<CodecStudyResult> run_codec_study(const CodecStudySettings& settings, Progress& progress) {
   CodecStudyResult result{.settings = settings};
-  TESSERA_ASSIGN_OR_RETURN(const std::shared_ptr<gpu::Device> device,
-                           gpu::Device::create({.select = settings.common.device}));
-  result.device = {device->info().name, device->info().driver, device->info().software};
-  TESSERA_ASSIGN_OR_RETURN(const auto scene, scene::load_scene(settings.common.scene));
-  TESSERA_ASSIGN_OR_RETURN(const CameraPath path, scene::load_path(settings.common.path));
-  TESSERA_ASSIGN_OR_RETURN(const auto shared, server::SharedScene::create(device, scene));
-  TESSERA_ASSIGN_OR_RETURN(const auto truth, TruthSource::create(shared, settings.common.scene, "none", 4));
+  TESSERA_ASSIGN_OR_RETURN(const StudyScene on, load_study_scene(settings.common));
+  result.device = on.description();
+  TESSERA_ASSIGN_OR_RETURN(const auto truth,
+                           TruthSource::create(on.shared, settings.common.scene, "none", 4));
   uint64_t steps = 0;
   for (const uint32_t mtexels : settings.mtexels) steps += (kCodecs.size() + 1) * mtexels;
   progress.begin("Mi texels", steps);
   for (const uint32_t mtexels : settings.mtexels) {
     SizeStudy study(settings, mtexels, result);
     for (const AtlasCodec codec : kCodecs) {
-      TESSERA_RETURN_IF_ERROR(study.stream(shared, path, *truth, codec));
+      TESSERA_RETURN_IF_ERROR(study.stream(on.shared, on.path, *truth, codec));
       progress.advance(mtexels);
     }
     TESSERA_RETURN_IF_ERROR(study.code());

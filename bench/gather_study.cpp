@@ -6,12 +6,11 @@
 #include <map>
 
 #include "atlas/layout.h"
-#include "base/camera_path.h"
 #include "bench/streamer.h"
+#include "bench/study_scene.h"
 #include "bench/texel_shader.h"
 #include "bench/texel_shading.h"
 #include "pvs/visibility.h"
-#include "scene/procedural.h"
 #include "server/shared_scene.h"
 #include "shading/reference.h"
 #include "shading/tessellator.h"
@@ -95,13 +94,12 @@ class Study {
 
 Status Study::set_up() {
   const LoopbackSettings& common = settings_.common;
-  TESSERA_ASSIGN_OR_RETURN(device_, gpu::Device::create({.select = common.device}));
-  TESSERA_ASSIGN_OR_RETURN(const auto scene, scene::load_scene(common.scene));
-  TESSERA_ASSIGN_OR_RETURN(const CameraPath path, scene::load_path(common.path));
-  TESSERA_ASSIGN_OR_RETURN(shared_, server::SharedScene::create(device_, scene));
+  TESSERA_ASSIGN_OR_RETURN(const StudyScene on, load_study_scene(common));
+  device_ = on.device;
+  shared_ = on.shared;
   const TimeNs time = from_seconds(common.start_s);
   view_ = client_view(common);
-  view_.pose = path.at(path.poses().front().time_ns + time);
+  view_.pose = on.path.at(on.path.poses().front().time_ns + time);
   TESSERA_ASSIGN_OR_RETURN(instant_, scene::SceneInstant::create(*device_, shared_->gpu_scene()));
   instant_->set(time, view_.pose.position);
   TESSERA_RETURN_IF_ERROR(shared_->lighting().update(*instant_));
@@ -112,7 +110,7 @@ Status Study::set_up() {
                                                    {.width = kAtlasWidth, .height = kAtlasHeight}));
   tessellates_ = shading::check_tessellator(*device_).ok();
   result_.settings = settings_;
-  result_.device = {device_->info().name, device_->info().driver, device_->info().software};
+  result_.device = on.description();
   return look();
 }
 

@@ -6,14 +6,11 @@
 #include <nlohmann/json.hpp>
 
 #include "CLI/CLI.hpp"
-#include "base/camera_path.h"
 #include "bench/image_io.h"
 #include "bench/shading_streamer.h"
+#include "bench/study_scene.h"
 #include "bench/texel_picture.h"
-#include "bench/truth_source.h"
 #include "pvs/visibility.h"
-#include "scene/gltf.h"
-#include "scene/procedural.h"
 
 namespace tessera::bench {
 namespace {
@@ -76,32 +73,25 @@ class Study {
     return served_at(index) + from_ms(s.server_ms + s.delay_ms + 500 / s.server_fps);
   }
   Pose pose_at(TimeNs now) const {
-    return path_->at(from_seconds(settings_.common.start_s + settings_.speed * to_seconds(now)));
+    return on_->path.at(from_seconds(settings_.common.start_s + settings_.speed * to_seconds(now)));
   }
 
   const LayoutStudySettings settings_;
   Progress& progress_;
   LayoutStudyResult result_;
-  std::shared_ptr<gpu::Device> device_;
-  std::shared_ptr<const scene::Scene> scene_;
-  std::shared_ptr<server::SharedScene> shared_;
-  std::optional<CameraPath> path_;
+  std::optional<StudyScene> on_;
   std::unique_ptr<TruthSource> truth_;
   std::optional<pvs::TriangleToPatch> patch_of_;
 };
 
 Status Study::set_up() {
   const LoopbackSettings& common = settings_.common;
-  TESSERA_ASSIGN_OR_RETURN(device_, gpu::Device::create({.select = common.device}));
-  TESSERA_ASSIGN_OR_RETURN(scene_, scene::load_scene(common.scene));
-  TESSERA_ASSIGN_OR_RETURN(CameraPath path, scene::load_path(common.path));
-  path_.emplace(std::move(path));
-  TESSERA_ASSIGN_OR_RETURN(shared_, server::SharedScene::create(device_, scene_));
-  TESSERA_ASSIGN_OR_RETURN(truth_, TruthSource::create(shared_, common.scene, common.truth_cache,
-                                                       common.truth == Truth::one ? 1 : 4));
-  patch_of_.emplace(*scene_);
+  TESSERA_ASSIGN_OR_RETURN(StudyScene on, load_study_scene(common));
+  on_.emplace(std::move(on));
+  TESSERA_ASSIGN_OR_RETURN(truth_, on_->truth(common));
+  patch_of_.emplace(*on_->scene);
   result_.settings = settings_;
-  result_.device = {device_->info().name, device_->info().driver, device_->info().software};
+  result_.device = on_->description();
   for (uint32_t i = 0; i < frame_count(); ++i) result_.frames += is_scored(i);
   return absl::OkStatus();
 }
@@ -198,7 +188,7 @@ Status Study::measure(const Case& c) {
   if (c.bitrate_mbps) common.bitrate_mbps = *c.bitrate_mbps;
   server::SessionSettings session = session_settings(common);
   session.layout = layout_settings(c.layout, c.atlas);
-  TESSERA_ASSIGN_OR_RETURN(const auto streamer, ShadingStreamer::create(shared_, common, session));
+  TESSERA_ASSIGN_OR_RETURN(const auto streamer, ShadingStreamer::create(on_->shared, common, session));
   LayoutRow& row = result_.rows.emplace_back(LayoutRow{
       .layout = c.layout, .width = c.atlas.width, .height = c.atlas.height, .bitrate_mbps = c.bitrate_mbps});
   Series series;
@@ -233,10 +223,11 @@ Status Study::measure_texel_shading() {
   // Sets the scene's moment.
   TESSERA_RETURN_IF_ERROR(truth_->render(view, begin, {.samples = 1, .ids = true}).status());
   const std::vector<dmat4> transforms = truth_->instant().instance_transforms();
-  TESSERA_ASSIGN_OR_RETURN(const UniqueTexture texture,
-                           UniqueTexture::create(*scene_, transforms, settings_.texture_mtexels * kMtexel));
-  TESSERA_ASSIGN_OR_RETURN(const auto shader,
-                           TexelShader::create(*device_, shared_->gpu_scene(), shared_->lighting(), texture));
+  TESSERA_ASSIGN_OR_RETURN(
+      const UniqueTexture texture,
+      UniqueTexture::create(*on_->scene, transforms, settings_.texture_mtexels * kMtexel));
+  TESSERA_ASSIGN_OR_RETURN(const auto shader, TexelShader::create(*on_->device, on_->shared->gpu_scene(),
+                                                                  on_->shared->lighting(), texture));
   LayoutRow& row = result_.rows.emplace_back(LayoutRow{.layout = kTexelShading});
   ErrorMean error;
   for (uint32_t i = 0; i < frame_count(); ++i) {
@@ -283,10 +274,6 @@ std::vector<Point> bits_by_error(const std::vector<LayoutRow>& rows, const Layou
     if (row.layout == layout && row.width == like.width && row.height == like.height && row.coded)
       points.push_back({row.coded->mssim, std::log(row.atlas_kbit + row.meta_kbit)});
   return points;
-}
-
-nlohmann::json to_json(const Percentiles& p) {
-  return {{"p50", p.p50}, {"p95", p.p95}, {"p99", p.p99}};
 }
 
 nlohmann::json to_json(const LayoutRow& row) {

@@ -5,7 +5,6 @@
 #include <future>
 #include <span>
 
-#include "base/camera_path.h"
 #include "base/log.h"
 #include "bench/coverage_meter.h"
 #include "bench/picture_streamer.h"
@@ -13,10 +12,9 @@
 #include "bench/scoring.h"
 #include "bench/shading_streamer.h"
 #include "bench/stream_simulation.h"
+#include "bench/study_scene.h"
 #include "bench/truth_source.h"
 #include "pvs/visibility.h"
-#include "scene/gltf.h"
-#include "scene/procedural.h"
 
 namespace tessera::bench {
 namespace {
@@ -113,18 +111,16 @@ class Loopback {
 };
 
 Status Loopback::set_up() {
-  TESSERA_ASSIGN_OR_RETURN(
-      device_, gpu::Device::create({.select = settings_.device, .validation = settings_.validation}));
+  TESSERA_ASSIGN_OR_RETURN(StudyScene on, load_study_scene(settings_));
   result_.settings = settings_;
-  result_.device = {device_->info().name, device_->info().driver, device_->info().software};
-  TESSERA_ASSIGN_OR_RETURN(scene_, scene::load_scene(settings_.scene));
-  TESSERA_ASSIGN_OR_RETURN(CameraPath path, scene::load_path(settings_.path));
-  path_.emplace(std::move(path));
+  result_.device = on.description();
+  TESSERA_ASSIGN_OR_RETURN(truth_, on.truth(settings_));
+  device_ = on.device;
+  scene_ = on.scene;
+  shared_ = on.shared;
+  path_.emplace(std::move(on.path));
   if (scene_->features.alpha_blend)
     result_.notes.push_back("blended materials are drawn opaque, in the truth too");
-  TESSERA_ASSIGN_OR_RETURN(shared_, server::SharedScene::create(device_, scene_, {}, settings_.gather));
-  TESSERA_ASSIGN_OR_RETURN(truth_, TruthSource::create(shared_, settings_.scene, settings_.truth_cache,
-                                                       settings_.truth == Truth::one ? 1 : 4));
   patch_of_.emplace(*scene_);
   masked_.emplace(*scene_);
 

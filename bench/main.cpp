@@ -150,10 +150,29 @@ int write_json(const std::string& path, const Result& result) {
   return written.ok() ? kOk : report_failure(written);
 }
 
-int run_loopback(const bench::LoopbackSettings& settings) {
+// And a page, where one was asked for.
+template <class Result>
+int write_files(const bench::LoopbackSettings& settings, const Result& result,
+                Status (*write_report)(const std::string& folder, const Result& result), const char* page) {
+  if (const int code = write_json(settings.json, result); code != kOk) return code;
+  if (settings.report.empty()) return kOk;
+  const Status written = write_report(settings.report, result);
+  if (!written.ok()) return report_failure(written);
+  std::cerr << "report: " << settings.report << "/" << page << std::endl;
+  return kOk;
+}
+
+// On standard error.
+template <class Result, class Settings>
+StatusOr<Result> with_progress(StatusOr<Result> (*run)(const Settings&, bench::Progress&),
+                               const Settings& settings) {
   const SteadyClock clock;
   bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
-  StatusOr<bench::LoopbackResult> result = bench::run_loopback(settings, progress);
+  return run(settings, progress);
+}
+
+int run_loopback(const bench::LoopbackSettings& settings) {
+  StatusOr<bench::LoopbackResult> result = with_progress(bench::run_loopback, settings);
   if (!result.ok()) return report_failure(result.status());
   if (settings.estimate_only) return kOk;
   result->settings = settings;
@@ -165,9 +184,7 @@ int run_loopback(const bench::LoopbackSettings& settings) {
 }
 
 int run_culling(const bench::LoopbackSettings& settings) {
-  const SteadyClock clock;
-  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
-  StatusOr<bench::CullingResult> result = bench::run_culling(settings, progress);
+  StatusOr<bench::CullingResult> result = with_progress(bench::run_culling, settings);
   if (!result.ok()) return report_failure(result.status());
   result->command = command_line("tessera-bench culling", settings);
   const bench::Percentiles ratio = result->ratio();
@@ -179,9 +196,7 @@ int run_culling(const bench::LoopbackSettings& settings) {
 }
 
 int run_memory(const bench::MemorySettings& settings) {
-  const SteadyClock clock;
-  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
-  StatusOr<bench::MemoryResult> result = bench::run_memory(settings, progress);
+  StatusOr<bench::MemoryResult> result = with_progress(bench::run_memory, settings);
   if (!result.ok()) return report_failure(result.status());
   result->command = command_line("tessera-bench memory", settings);
   std::cout << bench::to_text(*result) << std::flush;
@@ -189,9 +204,7 @@ int run_memory(const bench::MemorySettings& settings) {
 }
 
 int run_spatial(const bench::SpatialSettings& settings) {
-  const SteadyClock clock;
-  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
-  StatusOr<bench::SpatialResult> result = bench::run_spatial(settings, progress);
+  StatusOr<bench::SpatialResult> result = with_progress(bench::run_spatial, settings);
   if (!result.ok()) return report_failure(result.status());
   result->command =
       absl::StrFormat("%s --eye-distance-mm=%g", command_line("tessera-bench spatial", settings.common),
@@ -204,12 +217,7 @@ int run_spatial(const bench::SpatialSettings& settings) {
                                  100 * (1 - row.per_pixel), row.to_mono, row.mssim, row.mssim_center,
                                  100 * row.holes);
   }
-  if (const int code = write_json(settings.common.json, *result); code != kOk) return code;
-  if (settings.common.report.empty()) return kOk;
-  const Status written = bench::write_spatial_report(settings.common.report, *result);
-  if (!written.ok()) return report_failure(written);
-  std::cerr << "report: " << settings.common.report << "/spatial.html" << std::endl;
-  return kOk;
+  return write_files(settings.common, *result, bench::write_spatial_report, "spatial.html");
 }
 
 void print_summary(const bench::CodecStudyResult& result) {
@@ -236,9 +244,7 @@ void print_summary(const bench::CodecStudyResult& result) {
 }
 
 int run_codec(const bench::CodecStudySettings& settings) {
-  const SteadyClock clock;
-  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
-  StatusOr<bench::CodecStudyResult> result = bench::run_codec_study(settings, progress);
+  StatusOr<bench::CodecStudyResult> result = with_progress(bench::run_codec_study, settings);
   if (!result.ok()) return report_failure(result.status());
   result->command =
       absl::StrCat(command_line("tessera-bench codec", settings.common),
@@ -249,41 +255,34 @@ int run_codec(const bench::CodecStudySettings& settings) {
 }
 
 int run_gather(const bench::GatherStudySettings& settings) {
-  const SteadyClock clock;
-  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
-  StatusOr<bench::GatherStudyResult> result = bench::run_gather_study(settings, progress);
+  StatusOr<bench::GatherStudyResult> result = with_progress(bench::run_gather_study, settings);
   if (!result.ok()) return report_failure(result.status());
   result->command = command_line("tessera-bench gather", settings);
   std::cout << bench::to_text(*result) << std::flush;
-  if (const int code = write_json(settings.common.json, *result); code != kOk) return code;
-  if (settings.common.report.empty()) return kOk;
-  const Status written = bench::write_gather_report(settings.common.report, *result);
-  if (!written.ok()) return report_failure(written);
-  std::cerr << "report: " << settings.common.report << "/gather.html" << std::endl;
-  return kOk;
+  return write_files(settings.common, *result, bench::write_gather_report, "gather.html");
+}
+
+std::string command_of(const bench::LayoutStudySettings& settings) {
+  std::string command =
+      absl::StrCat(command_line("tessera-bench layouts", settings.common),
+                   " --layouts=", absl::StrJoin(settings.layouts, ","),
+                   " --atlases=", absl::StrJoin(settings.atlases, ",", absl::StreamFormatter()),
+                   " --speed=", settings.speed, " --texture-mtexels=", settings.texture_mtexels);
+  if (!settings.bitrates_mbps.empty())
+    absl::StrAppend(&command, " --bitrates-mbps=", absl::StrJoin(settings.bitrates_mbps, ","));
+  return command;
 }
 
 int run_layouts(const bench::LayoutStudySettings& settings) {
-  const SteadyClock clock;
-  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
-  StatusOr<bench::LayoutStudyResult> result = bench::run_layout_study(settings, progress);
+  StatusOr<bench::LayoutStudyResult> result = with_progress(bench::run_layout_study, settings);
   if (!result.ok()) return report_failure(result.status());
-  result->command =
-      absl::StrCat(command_line("tessera-bench layouts", settings.common),
-                   " --layouts=", absl::StrJoin(settings.layouts, ","), " --speed=", settings.speed);
+  result->command = command_of(settings);
   std::cout << bench::to_text(*result) << std::flush;
-  if (const int code = write_json(settings.common.json, *result); code != kOk) return code;
-  if (settings.common.report.empty()) return kOk;
-  const Status written = bench::write_layout_report(settings.common.report, *result);
-  if (!written.ok()) return report_failure(written);
-  std::cerr << "report: " << settings.common.report << "/layouts.html" << std::endl;
-  return kOk;
+  return write_files(settings.common, *result, bench::write_layout_report, "layouts.html");
 }
 
 int run_stability(const bench::StabilitySettings& settings) {
-  const SteadyClock clock;
-  bench::Progress progress(std::cerr, isatty(STDERR_FILENO), clock);
-  StatusOr<bench::StabilityResult> result = bench::run_stability(settings, progress);
+  StatusOr<bench::StabilityResult> result = with_progress(bench::run_stability, settings);
   if (!result.ok()) return report_failure(result.status());
   result->command = absl::StrCat(command_line("tessera-bench stability", settings.common),
                                  " --sub-pixel-triangles=", settings.sub_pixel_triangles);
@@ -315,26 +314,30 @@ int main(int argc, char** argv) {
       ->envname("TESSERA_BENCH_LOG")
       ->capture_default_str();
 
-  CLI::App* loopback = app.add_subcommand("loopback", "server → network → client, scored frame by frame");
+  const auto command = [&app](const char* name, const char* description, const char* footer) {
+    CLI::App* added = app.add_subcommand(name, description);
+    added->footer(footer);
+    added->fallthrough();
+    return added;
+  };
+
+  CLI::App* loopback =
+      command("loopback", "server → network → client, scored frame by frame", kLoopbackFooter);
   bench::LoopbackSettings settings;
   bench::add_options(*loopback, settings);
-  loopback->footer(kLoopbackFooter);
-  loopback->fallthrough();
 
-  CLI::App* culling = app.add_subcommand("culling", "id-buffer time with culling against drawing everything");
+  CLI::App* culling =
+      command("culling", "id-buffer time with culling against drawing everything", kCullingFooter);
   bench::LoopbackSettings culling_settings;
   bench::add_options(*culling, culling_settings, bench::culling_options());
-  culling->footer(kCullingFooter);
-  culling->fallthrough();
 
-  CLI::App* memory = app.add_subcommand("memory", "atlas memory: time, and where its texels are by strategy");
+  CLI::App* memory =
+      command("memory", "atlas memory: time, and where its texels are by strategy", kMemoryFooter);
   bench::MemorySettings memory_settings;
   bench::add_options(*memory, memory_settings);
-  memory->footer(kMemoryFooter);
-  memory->fallthrough();
 
   CLI::App* spatial =
-      app.add_subcommand("spatial", "samples and error of stereo, foveation, lenses and upsampling");
+      command("spatial", "samples and error of stereo, foveation, lenses and upsampling", kSpatialFooter);
   bench::SpatialSettings spatial_settings = bench::default_spatial_settings();
   bench::add_options(*spatial, spatial_settings.common, bench::spatial_options());
   spatial->add_option("--eye-distance-mm", spatial_settings.eye_distance_mm, "between the two eyes")
@@ -348,34 +351,24 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember(methods))
       ->delimiter(',')
       ->group("Server");
-  spatial->footer(kSpatialFooter);
-  spatial->fallthrough();
 
-  CLI::App* codec = app.add_subcommand("codec", "time, bits and error of the atlas's codecs");
+  CLI::App* codec = command("codec", "time, bits and error of the atlas's codecs", kCodecFooter);
   bench::CodecStudySettings codec_settings;
   bench::add_options(*codec, codec_settings);
-  codec->footer(kCodecFooter);
-  codec->fallthrough();
 
-  CLI::App* gather = app.add_subcommand("gather", "cost of a shaded sample by shape, size and path");
+  CLI::App* gather = command("gather", "cost of a shaded sample by shape, size and path", kGatherFooter);
   bench::GatherStudySettings gather_settings;
   bench::add_options(*gather, gather_settings);
-  gather->footer(kGatherFooter);
-  gather->fallthrough();
 
   CLI::App* layouts =
-      app.add_subcommand("layouts", "error by samples and bits by error of every atlas layout");
+      command("layouts", "error by samples and bits by error of every atlas layout", kLayoutsFooter);
   bench::LayoutStudySettings layout_settings = bench::default_layout_study_settings();
   bench::add_options(*layouts, layout_settings);
-  layouts->footer(kLayoutsFooter);
-  layouts->fallthrough();
 
   CLI::App* stability =
-      app.add_subcommand("stability", "extreme geometry and sampling, with the error of each case");
+      command("stability", "extreme geometry and sampling, with the error of each case", kStabilityFooter);
   bench::StabilitySettings stability_settings;
   bench::add_options(*stability, stability_settings);
-  stability->footer(kStabilityFooter);
-  stability->fallthrough();
 
   CLI::App* report = app.add_subcommand("report", "one page from all runs in a folder");
   std::string folder;

@@ -11,10 +11,6 @@ namespace {
 
 using nlohmann::json;
 
-json to_json(const Percentiles& p) {
-  return {{"p50", p.p50}, {"p95", p.p95}, {"p99", p.p99}};
-}
-
 json to_json(const SpeedRow& row) {
   return {{"patches", row.patches},
           {"requests", row.requests},

@@ -17,10 +17,6 @@ namespace {
 
 using nlohmann::json;
 
-json to_json(const Percentiles& p) {
-  return {{"p50", p.p50}, {"p95", p.p95}, {"p99", p.p99}};
-}
-
 json to_json(const Row& row) {
   json j{{"method", row.method},
          {"session", row.session},
@@ -121,6 +117,10 @@ void add_durations(std::span<const FrameRecord> records, Row& row) {
   row.end_to_end_ms = percentiles(std::move(end_to_end));
   row.overhead_ms = percentiles(std::move(overhead));
   row.tiling_error_ms_max = to_ms(tiling);
+}
+
+json to_json(const Percentiles& p) {
+  return {{"p50", p.p50}, {"p95", p.p95}, {"p99", p.p99}};
 }
 
 json run_json(const std::string& command, const DeviceDescription& device, const LoopbackSettings& settings) {

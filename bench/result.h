@@ -24,6 +24,7 @@ struct Percentiles {
 };
 // Of any values; linear between the two nearest ranks; zeros for none.
 Percentiles percentiles(std::vector<double> values);
+nlohmann::json to_json(const Percentiles& p);
 
 // Sums up one session, or one baseline. Means are over displayed frames, shares in [0, 1], times in ms. What
 // a method does not have is left out of the JSON.

@@ -5,13 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "base/camera_path.h"
 #include "bench/image_io.h"
 #include "bench/shading_streamer.h"
-#include "bench/truth_source.h"
+#include "bench/study_scene.h"
 #include "pvs/visibility.h"
-#include "scene/gltf.h"
-#include "scene/procedural.h"
 
 namespace tessera::bench {
 namespace {
@@ -78,26 +75,19 @@ class Study {
   const SpatialSettings settings_;
   Progress& progress_;
   SpatialResult result_;
-  std::shared_ptr<gpu::Device> device_;
-  std::shared_ptr<const scene::Scene> scene_;
-  std::shared_ptr<server::SharedScene> shared_;
-  std::optional<CameraPath> path_;
+  std::optional<StudyScene> on_;
   std::unique_ptr<TruthSource> truth_;
   std::optional<pvs::TriangleToPatch> patch_of_;
 };
 
 Status Study::set_up() {
   const LoopbackSettings& common = settings_.common;
-  TESSERA_ASSIGN_OR_RETURN(device_, gpu::Device::create({.select = common.device}));
-  TESSERA_ASSIGN_OR_RETURN(scene_, scene::load_scene(common.scene));
-  TESSERA_ASSIGN_OR_RETURN(CameraPath path, scene::load_path(common.path));
-  path_.emplace(std::move(path));
-  TESSERA_ASSIGN_OR_RETURN(shared_, server::SharedScene::create(device_, scene_));
-  TESSERA_ASSIGN_OR_RETURN(truth_, TruthSource::create(shared_, common.scene, common.truth_cache,
-                                                       common.truth == Truth::one ? 1 : 4));
-  patch_of_.emplace(*scene_);
+  TESSERA_ASSIGN_OR_RETURN(StudyScene on, load_study_scene(common));
+  on_.emplace(std::move(on));
+  TESSERA_ASSIGN_OR_RETURN(truth_, on_->truth(common));
+  patch_of_.emplace(*on_->scene);
   result_.settings = settings_;
-  result_.device = {device_->info().name, device_->info().driver, device_->info().software};
+  result_.device = on_->description();
   result_.frames = static_cast<uint32_t>(std::max(1L, std::lround(common.seconds * common.server_fps)));
   return absl::OkStatus();
 }
@@ -118,9 +108,9 @@ Plane Study::samples_per_pixel(ShadingStreamer& streamer, const shading::Referen
     uint64_t texels = 0;
     for (const atlas::Placement& p : placed) texels += p.color_texels();
     if (texels == 0) return 0.0f;
-    const uint32_t i = scene_->instance_of(patch);
-    const scene::Instance& instance = scene_->instances[i];
-    const scene::Geometry& geometry = scene_->geometries[instance.geometry];
+    const uint32_t i = on_->scene->instance_of(patch);
+    const scene::Instance& instance = on_->scene->instances[i];
+    const scene::Geometry& geometry = on_->scene->geometries[instance.geometry];
     const scene::Footprint size = pvs::footprint(geometry, geometry.patches[patch - instance.first_patch],
                                                  transforms[i], view.pose.position, view.pixels_per_radian());
     return static_cast<float>(texels) / std::max(size.area_px2, 1e-3f);
@@ -161,7 +151,7 @@ Status Study::look(const SpatialCase& method, ShadingStreamer& streamer, uint32_
 }
 
 Status Study::frame(const SpatialCase& method, ShadingStreamer& streamer, uint32_t index, SpatialRow& row) {
-  const TimedPose pose{time_of(index), path_->at(time_of(index))};
+  const TimedPose pose{time_of(index), on_->path.at(time_of(index))};
   TESSERA_ASSIGN_OR_RETURN(
       const std::vector<Packet> packets,
       streamer.serve({.number = index, .poses = std::span(&pose, 1), .scene_time_ns = pose.time_ns}));
@@ -192,8 +182,8 @@ const SpatialRow* Study::mono_like(const SpatialCase& method) const {
 }
 
 Status Study::measure(const SpatialCase& method) {
-  TESSERA_ASSIGN_OR_RETURN(const auto streamer,
-                           ShadingStreamer::create(shared_, settings_.common, session_of(settings_, method)));
+  TESSERA_ASSIGN_OR_RETURN(const auto streamer, ShadingStreamer::create(on_->shared, settings_.common,
+                                                                        session_of(settings_, method)));
   SpatialRow row{.method = method};
   for (uint32_t i = 0; i < result_.frames; ++i) {
     TESSERA_RETURN_IF_ERROR(frame(method, *streamer, i, row));

@@ -12,16 +12,24 @@
 namespace tessera::bench {
 namespace {
 
-TEST(GatherStudy, EveryLoadIsShadedOnEveryPath) {
+GatherStudySettings small_study(Size size, uint32_t samples) {
   GatherStudySettings settings;
   settings.common.scene = "gallery:0";
-  settings.common.size = {320, 180};
-  settings.samples = 20'000;
+  settings.common.size = size;
+  settings.samples = samples;
   settings.rounds = 1;
   settings.texture_mtexels = 1;
+  return settings;
+}
+
+StatusOr<GatherStudyResult> run_silently(const GatherStudySettings& settings) {
   std::ostringstream silent;
   Progress progress(silent);
-  auto result = run_gather_study(settings, progress);
+  return run_gather_study(settings, progress);
+}
+
+TEST(GatherStudy, EveryLoadIsShadedOnEveryPath) {
+  const auto result = run_silently(small_study({320, 180}, 20'000));
   ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_GT(result->covered, 0.5);
   EXPECT_GT(result->forward_ns.median, result->shading_ns.median);
@@ -67,15 +75,9 @@ TEST(GatherStudy, EveryLoadIsShadedOnEveryPath) {
 }
 
 TEST(GatherStudy, OnlyTheGroupsThatWereAskedFor) {
-  GatherStudySettings settings;
-  settings.common.scene = "gallery:0";
-  settings.common.size = {160, 90};
-  settings.samples = 2'000;
-  settings.rounds = 1;
+  GatherStudySettings settings = small_study({160, 90}, 2'000);
   settings.groups = {"l"};
-  std::ostringstream silent;
-  Progress progress(silent);
-  const auto result = run_gather_study(settings, progress);
+  const auto result = run_silently(settings);
   ASSERT_TRUE(result.ok()) << result.status();
   ASSERT_FALSE(result->rows.empty());
   for (const GatherRow& row : result->rows) EXPECT_EQ(row.group, "l");
