@@ -24,7 +24,7 @@ struct ClientCore::Impl {
   Pairing pairing{pairs};
   geometry_compression::MetaFrame meta;  // kept for its memory
 
-  std::atomic<uint64_t> pairs_published{0}, pairs_skipped{0}, atlas_frames{0}, meta_frames{0},
+  std::atomic<uint64_t> pairs_published{0}, pairs_skipped{0}, atlas_frames{0}, meta_frames{0}, orphans{0},
       decode_errors{0};
   std::atomic<FrameNumber> newest_pair{0};
   std::atomic<bool> wants_key_frame{false};
@@ -47,7 +47,7 @@ StatusOr<FrameNumber> ClientCore::on_atlas(std::span<const uint8_t> access_unit)
     ++impl_->atlas_frames;
     status = impl_->pairing.on_atlas(decoded->frame, decoded->picture);
   }
-  if (!status.ok()) ++impl_->decode_errors;
+  if (!status.ok()) ++(absl::IsFailedPrecondition(status) ? impl_->orphans : impl_->decode_errors);
   impl_->publish_stats();
   if (!status.ok()) return status;
   return decoded->frame;
@@ -80,6 +80,7 @@ ClientStats ClientCore::stats() const {
   return {.pairs = impl_->pairs_published.load(std::memory_order_relaxed),
           .atlas_frames = impl_->atlas_frames.load(std::memory_order_relaxed),
           .meta_frames = impl_->meta_frames.load(std::memory_order_relaxed),
+          .orphans = impl_->orphans.load(std::memory_order_relaxed),
           .decode_errors = impl_->decode_errors.load(std::memory_order_relaxed),
           .pairs_skipped = impl_->pairs_skipped.load(std::memory_order_relaxed),
           .newest_pair = impl_->newest_pair.load(std::memory_order_relaxed)};

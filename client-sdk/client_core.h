@@ -18,7 +18,8 @@ namespace tessera::client {
 struct ClientStats {
   uint64_t pairs = 0;  // complete pairs handed to the display side
   uint64_t atlas_frames = 0, meta_frames = 0;
-  uint64_t decode_errors = 0;
+  uint64_t orphans = 0;        // atlases that came whole, but build on one that did not
+  uint64_t decode_errors = 0;  // damaged atlases and metas
   uint64_t pairs_skipped = 0;  // replaced by a newer pair before they were drawn
   FrameNumber newest_pair = 0;
 };

@@ -27,7 +27,7 @@ class AtlasDecoder {
   virtual ~AtlasDecoder() = default;
 
   // One whole access unit in, its picture out. InvalidArgument: damaged data; video then waits for the next
-  // key frame.
+  // key frame. FailedPrecondition: video that builds on a frame that was not decoded.
   virtual StatusOr<DecodedFrame> decode(std::span<const uint8_t> access_unit) = 0;
 };
 

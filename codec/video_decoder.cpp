@@ -62,9 +62,9 @@ Status VideoDecoder::Impl::admit(std::span<const uint8_t> access_unit, FrameTag&
   tag = *info.tag;
   if (info.key_frame) return absl::OkStatus();
   if (!reference)
-    return absl::InvalidArgumentError(absl::StrFormat("frame %u: waiting for a key frame", tag.frame));
+    return absl::FailedPreconditionError(absl::StrFormat("frame %u: waiting for a key frame", tag.frame));
   if (tag.reference != *reference)
-    return absl::InvalidArgumentError(absl::StrFormat(
+    return absl::FailedPreconditionError(absl::StrFormat(
         "frame %u builds on frame %u, but the last one decoded is %u", tag.frame, tag.reference, *reference));
   return absl::OkStatus();
 }

@@ -6,12 +6,11 @@
 #include <optional>
 #include <thread>
 
+#include "base/log.h"
 #include "gpu/impl.h"
 
 namespace tessera::gpu {
 namespace {
-
-constexpr uint64_t kWaitNs = 60'000'000'000;
 
 std::unique_ptr<Recorder> make_recorder(const Core& core) {
   auto recorder = std::make_unique<Recorder>();
@@ -58,7 +57,8 @@ auto on_background_thread(F&& work) {
 
 }  // namespace
 
-DeviceImpl::DeviceImpl(std::shared_ptr<Core> core) : core_(std::move(core)) {
+DeviceImpl::DeviceImpl(std::shared_ptr<Core> core, DurationNs slow_ns)
+    : core_(std::move(core)), slow_ns_(slow_ns) {
   const vk::SemaphoreTypeCreateInfo type(vk::SemaphoreType::eTimeline, 0);
   timeline_ = core_->device.createSemaphore(vk::SemaphoreCreateInfo({}, &type));
 }
@@ -124,11 +124,7 @@ Status DeviceImpl::wait(Ticket ticket) {
         absl::StrCat("wait: ticket ", ticket, " was never submitted; the newest is ", last_));
   }
   return guarded([&]() -> Status {
-    const vk::SemaphoreWaitInfo info({}, *timeline_, ticket);
-    if (core_->device.waitSemaphores(info, kWaitNs) == vk::Result::eTimeout) {
-      return absl::DeadlineExceededError(
-          absl::StrCat("vkWaitSemaphores: the device \"", core_->info.name, "\" did not finish within 60 s"));
-    }
+    wait_until_done(ticket);
     while (!in_flight_.empty() && in_flight_.front()->ticket <= ticket) {
       if (in_flight_.front()->ticket == ticket) read_intervals(*in_flight_.front());
       idle_.push_back(std::move(in_flight_.front()));
@@ -136,6 +132,17 @@ Status DeviceImpl::wait(Ticket ticket) {
     }
     return absl::OkStatus();
   });
+}
+
+void DeviceImpl::wait_until_done(Ticket ticket) {
+  const vk::SemaphoreWaitInfo info({}, *timeline_, ticket);
+  DurationNs lasted = 0, patience = slow_ns_;
+  while (core_->device.waitSemaphores(info, static_cast<uint64_t>(patience)) == vk::Result::eTimeout) {
+    lasted += patience;
+    patience = lasted;
+    spdlog::warn("gpu: {} works for {:.3g} s already on one submission", core_->info.name,
+                 to_seconds(lasted));
+  }
 }
 
 void DeviceImpl::read_intervals(const Recorder& recorder) {
@@ -163,7 +170,8 @@ StatusOr<std::shared_ptr<Device>> Device::create(const DeviceOptions& options) {
   TESSERA_ASSIGN_OR_RETURN(std::shared_ptr<Core> core,
                            on_background_thread([&] { return Core::create(options); }));
   return guarded([&]() -> StatusOr<std::shared_ptr<Device>> {
-    return std::shared_ptr<Device>(new Device(std::make_unique<DeviceImpl>(std::move(core))));
+    return std::shared_ptr<Device>(
+        new Device(std::make_unique<DeviceImpl>(std::move(core), options.slow_ns)));
   });
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/status.h"
+#include "base/time.h"
 
 namespace tessera::gpu {
 
@@ -27,6 +28,8 @@ struct DeviceOptions {
 #endif
   // With `validation`: the layer also reports missing barriers (slow).
   bool validate_synchronization = false;
+  // Work that lasts longer is logged as a warning, again whenever it has lasted twice as long.
+  DurationNs slow_ns = 60 * kNsPerSecond;
 };
 
 struct DeviceInfo {
@@ -56,8 +59,8 @@ class Device {
   // Hands the recorded work to the queue. Buffers, images and pipelines that it uses must live until it is
   // done.
   StatusOr<Ticket> submit(Commands commands);
-  // Blocks until `ticket` is reached. DeadlineExceeded after 60 s (a hung device), Unavailable if the device
-  // is lost.
+  // Blocks until `ticket` is reached, however long that takes: until then the device uses what it was given.
+  // Unavailable if the device is lost (a hung one, too, once its driver has given it up).
   Status wait(Ticket ticket);
   // submit + wait.
   Status run(Commands commands);

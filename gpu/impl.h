@@ -100,7 +100,7 @@ struct Commands::Impl {
 
 class DeviceImpl {
  public:
-  explicit DeviceImpl(std::shared_ptr<Core> core);
+  DeviceImpl(std::shared_ptr<Core> core, DurationNs slow_ns);
   ~DeviceImpl();
 
   const std::shared_ptr<Core>& core() const { return core_; }
@@ -111,9 +111,11 @@ class DeviceImpl {
 
  private:
   std::unique_ptr<Recorder> take_recorder();
+  void wait_until_done(Ticket ticket);
   void read_intervals(const Recorder& recorder);
 
   std::shared_ptr<Core> core_;
+  const DurationNs slow_ns_;
   vk::raii::Semaphore timeline_ = nullptr;
   Ticket last_ = 0;
   std::deque<std::unique_ptr<Recorder>> in_flight_;  // by ticket

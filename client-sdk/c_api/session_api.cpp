@@ -224,6 +224,7 @@ TesseraResult tesseraGetStatistics(TesseraSession session, TesseraStatistics* st
     statistics->packets = stats.media.packets;
     statistics->packetsRecovered = stats.media.recovered;
     statistics->packetsLost = stats.media.given_up;
+    statistics->framesOrphaned = stats.core.orphans;
     statistics->decodeErrors = stats.core.decode_errors;
     statistics->networkRoundTrip = stats.round_trip_ns.value_or(0);
     return TESSERA_SUCCESS;

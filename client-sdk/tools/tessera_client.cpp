@@ -290,6 +290,7 @@ StatusOr<nlohmann::json> view(const Settings& s) {
                         {"packets", stats.media.packets},
                         {"packets_recovered", stats.media.recovered},
                         {"packets_given_up", stats.media.given_up},
+                        {"orphans", stats.core.orphans},
                         {"decode_errors", stats.core.decode_errors}};
 }
 

@@ -55,7 +55,7 @@ TEST(CodecThreads, StreamsDoNotDisturbEachOther) {
   }
   for (const Outcome& outcome : outcomes) {
     EXPECT_EQ(outcome.decoded, kFrames);
-    EXPECT_EQ(outcome.after_noise.code(), absl::StatusCode::kInvalidArgument) << outcome.after_noise;
+    EXPECT_EQ(outcome.after_noise.code(), absl::StatusCode::kFailedPrecondition) << outcome.after_noise;
   }
 }
 

@@ -83,7 +83,7 @@ TEST(VideoDecoder, AfterALostUnitItWaitsForTheNextKeyFrame) {
       const auto frame = decoder->decode(units[i].bytes);
       EXPECT_EQ(frame.ok(), i < lost || i >= 8) << "lost " << lost << ", unit " << i;
       if (!frame.ok()) {
-        EXPECT_EQ(frame.status().code(), absl::StatusCode::kInvalidArgument);
+        EXPECT_EQ(frame.status().code(), absl::StatusCode::kFailedPrecondition);
       }
     }
   }

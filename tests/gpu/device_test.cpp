@@ -2,6 +2,8 @@
 
 #include <gtest/gtest-spi.h>
 
+#include <algorithm>
+
 #include "gpu_test.h"
 
 namespace tessera::gpu {
@@ -84,6 +86,23 @@ TEST(Validation, AFaultIsCountedAndFailsTheTest) {
   EXPECT_GT(device->validation_messages(), 0u) << "the target is larger than its image";
   EXPECT_EQ(failures.size(), device->validation_messages());
   EXPECT_THAT(failures, Each(HasSubstr("vulkan: ")));
+}
+
+// Whoever waits frees next what the device works on: an early return would be memory that it still writes.
+TEST(DeviceWait, OutlastsAnySubmission) {
+  const auto device = value(Device::create({.select = "cpu", .validation = true, .slow_ns = 1}));
+  constexpr int64_t words = 1 << 22;
+  const Buffer target = value(Buffer::create(*device, 4 * words, Memory::readback, "target"));
+  Commands commands = device->begin();
+  for (uint32_t value = 1; value <= 16; ++value) {
+    commands.fill(target, value);
+    commands.barrier();
+  }
+  testing::internal::CaptureStdout();
+  const Status status = device->run(std::move(commands));
+  EXPECT_THAT(testing::internal::GetCapturedStdout(), HasSubstr("works for"));
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_EQ(std::ranges::count(target.as<uint32_t>(), 16u), words);
 }
 
 using DeviceTest = GpuTest;
