@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -23,12 +24,16 @@ class FrameReader {
   FrameReader(const FrameReader&) = delete;
   FrameReader& operator=(const FrameReader&) = delete;
 
-  // All records so far, those included that the daemon has not sent yet. Call it once, while the session
-  // lives. Errors are those of WatchFrames: records are all there, or none is returned.
-  StatusOr<std::vector<FrameRecord>> finish();
+  // All records so far, those included that the daemon has not sent yet. The client's report of frame `last`
+  // may still be on its way there: finish() waits for its record, 10 s at most. Call it once, while the
+  // session lives. Errors are those of WatchFrames: records are all there, or none is returned.
+  StatusOr<std::vector<FrameRecord>> finish(std::optional<FrameNumber> last = std::nullopt);
 
  private:
-  Status read(grpc::ClientContext& context, bool once);
+  // Until `done`, which looks at records_, or the stream's end.
+  template <class Done>
+  Status read(grpc::ClientContext& context, bool once, Done&& done);
+  Status read_rest(std::optional<FrameNumber> last);
   void stop();
 
   v1::Control::Stub& control_;

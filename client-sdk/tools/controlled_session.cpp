@@ -123,9 +123,9 @@ void ControlledSession::record_frames() {
   reader_ = std::make_unique<FrameReader>(*stub_, id_);
 }
 
-StatusOr<std::vector<FrameRecord>> ControlledSession::frames() {
+StatusOr<std::vector<FrameRecord>> ControlledSession::frames(std::optional<FrameNumber> last) {
   if (!reader_) return std::vector<FrameRecord>();
-  return reader_->finish();
+  return reader_->finish(last);
 }
 
 ControlledSession::~ControlledSession() {

@@ -35,7 +35,8 @@ class ControlledSession {
   StatusOr<v1::Box> bounds();
   // From now on, for frames().
   void record_frames();
-  StatusOr<std::vector<FrameRecord>> frames();
+  // `last`: see FrameReader::finish().
+  StatusOr<std::vector<FrameRecord>> frames(std::optional<FrameNumber> last);
 
  private:
   ControlledSession() = default;

@@ -165,6 +165,8 @@ class Viewer {
     }
   }
   const Totals& totals() const { return totals_; }
+  // That it showed.
+  std::optional<FrameNumber> newest() const { return pair_ ? std::optional(pair_->frame) : std::nullopt; }
 
  private:
   Status show() {
@@ -277,7 +279,7 @@ StatusOr<nlohmann::json> view(const Settings& s) {
   TESSERA_RETURN_IF_ERROR(viewer.run());
   if (writer) TESSERA_RETURN_IF_ERROR(writer->finish());
   if (session) {
-    TESSERA_ASSIGN_OR_RETURN(const std::vector<FrameRecord> frames, session->frames());
+    TESSERA_ASSIGN_OR_RETURN(const std::vector<FrameRecord> frames, session->frames(viewer.newest()));
     TESSERA_RETURN_IF_ERROR(write_frames(s, frames));
   }
   const client::ConnectionStats stats = connection->stats();
