@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -346,7 +347,8 @@ int main(int argc, char** argv) {
       ->group("Client")
       ->capture_default_str();
   std::vector<std::string> methods;
-  for (const bench::SpatialCase& method : bench::spatial_cases()) methods.push_back(method.name);
+  for (const bench::SpatialCase& method : bench::spatial_cases())
+    if (std::ranges::find(methods, method.name) == methods.end()) methods.push_back(method.name);
   spatial->add_option("--methods", spatial_settings.methods, "which to measure; default: all")
       ->check(CLI::IsMember(methods))
       ->delimiter(',')

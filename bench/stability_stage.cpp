@@ -11,8 +11,8 @@
 namespace tessera::bench {
 namespace {
 
-constexpr uint32_t kAtlasSide =
-    1024;  // holds all that the cases ask for: an atlas that is full has cases of its own
+// Holds all that the cases ask for: an atlas that is full has cases of its own.
+constexpr uint32_t kAtlasSide = 512;
 constexpr DurationNs kHorizonNs = 167 * kNsPerMs;  // six views: the last five look through all samples
 constexpr int kSamples = 4;                        // a pixel, of truth and client
 // Of blue, of which the meshes have none: one sample of background.
