@@ -33,8 +33,9 @@ struct ClientCore::Impl {
 ClientCore::ClientCore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 ClientCore::~ClientCore() = default;
 
-StatusOr<std::unique_ptr<ClientCore>> ClientCore::create(AtlasCodec codec) {
-  TESSERA_ASSIGN_OR_RETURN(auto decoder, codec::AtlasDecoder::create(codec));
+StatusOr<std::unique_ptr<ClientCore>> ClientCore::create(AtlasCodec codec, uint32_t max_width,
+                                                         uint32_t max_height) {
+  TESSERA_ASSIGN_OR_RETURN(auto decoder, codec::AtlasDecoder::create(codec, max_width, max_height));
   return std::unique_ptr<ClientCore>(new ClientCore(std::make_unique<Impl>(std::move(decoder))));
 }
 

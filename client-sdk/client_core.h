@@ -41,7 +41,9 @@ struct Pair {
 // key frame.
 class ClientCore {
  public:
-  static StatusOr<std::unique_ptr<ClientCore>> create(AtlasCodec codec = AtlasCodec::h264);
+  // Larger atlases are refused: the session's welcome names its size.
+  static StatusOr<std::unique_ptr<ClientCore>> create(AtlasCodec codec = AtlasCodec::h264,
+                                                      uint32_t max_width = 8192, uint32_t max_height = 8192);
   ~ClientCore();
 
   // One whole access unit, or picture packet; the frame that it belongs to. An error is counted and returned,

@@ -118,7 +118,7 @@ Status Connection::Impl::open_meta() {
         welcome = answer;
         if (!connection.ok()) return done->set_value(connection.status());
         meta = *connection;  // before its first frame
-        auto made = ClientCore::create(answer.codec);
+        auto made = ClientCore::create(answer.codec, answer.atlas_width, answer.atlas_height);
         if (made.ok()) core = *std::move(made);
         done->set_value(made.status());
       });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <span>
 
 #include "codec/mcu_tiles.h"
@@ -19,8 +20,9 @@ constexpr int kTries = 3, kMostTries = 8;  // with the whole picture: while one 
 constexpr int kPlanTries = 6;              // with its sample,
 constexpr double kPlanError = 0.01;        // or as near as that
 
-// The sample: every n-th run of squares. Runs are short, because neighbours are alike: the more places, the
-// better the sample stands for the whole.
+// The sample: a run of squares in every n, at a place of its own in each: an even stride that divides the
+// atlas's rows would see a few of its columns alone. Runs are short, because neighbours are alike: the more
+// places, the better the sample stands for the whole.
 constexpr size_t kRunMcus = 4, kSampleEvery = 24, kMinSampleRuns = 64;
 
 std::vector<uint32_t> sample_of(std::span<const uint32_t> mcus) {
@@ -28,7 +30,10 @@ std::vector<uint32_t> sample_of(std::span<const uint32_t> mcus) {
   const size_t taken = std::min(runs, std::max(kMinSampleRuns, runs / kSampleEvery));
   std::vector<uint32_t> sample;
   for (size_t i = 0; i < taken; ++i) {
-    const auto run = mcus.subspan(i * runs / taken * kRunMcus);
+    const double place = std::fmod(static_cast<double>(i) * std::numbers::phi, 1.0);
+    const auto at = static_cast<size_t>((static_cast<double>(i) + place) * static_cast<double>(runs) /
+                                        static_cast<double>(taken));
+    const auto run = mcus.subspan(std::min(at, runs - 1) * kRunMcus);
     sample.insert(sample.end(), run.begin(), run.begin() + std::min(kRunMcus, run.size()));
   }
   return sample;

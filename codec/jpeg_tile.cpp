@@ -56,9 +56,12 @@ struct McuRow {
   }
 };
 
-// Room for the worst case, as libjpeg's wrapper TurboJPEG computes it.
+// Room for the worst case: codes made for another picture may take 16 bits for the symbol of a coefficient,
+// then up to 11 of its own, each bit of which may be in a byte 0xff that is stuffed. 4:2:0 has 1.5
+// coefficients a texel.
 constexpr size_t max_compressed_bytes(size_t luma_samples) {
-  return 3 * luma_samples + 2048;
+  constexpr size_t kBitsATexel = 2 * 27 * 3 / 2;
+  return kBitsATexel * luma_samples / 8 + 2048;
 }
 
 }  // namespace
@@ -224,6 +227,8 @@ struct JpegDecompressor::Impl {
   ~Impl() { jpeg_destroy_decompress(&codec); }
 
   bool set_up();
+  void forget_tables();
+  const char* check_tables() const;
   const char* check(const YuvImage& expected) const;
   const char* read(std::span<const uint8_t> tables, std::span<const uint8_t> tile, YuvImage& picture);
   const char* read_picture(YuvImage& picture);
@@ -234,6 +239,28 @@ bool JpegDecompressor::Impl::set_up() {
   if (setjmp(errors.jump)) return false;
   jpeg_create_decompress(&codec);
   return true;
+}
+
+// libjpeg keeps them from picture to picture.
+void JpegDecompressor::Impl::forget_tables() {
+  for (JQUANT_TBL* table : codec.quant_tbl_ptrs)
+    if (table) std::ranges::fill(table->quantval, UINT16{0});
+  for (int i = 0; i < NUM_HUFF_TBLS; ++i)
+    for (JHUFF_TBL* table : {codec.dc_huff_tbl_ptrs[i], codec.ac_huff_tbl_ptrs[i]})
+      if (table) std::ranges::fill(table->bits, UINT8{0});
+}
+
+const char* JpegDecompressor::Impl::check_tables() const {
+  const auto has_codes = [](const JHUFF_TBL* table) {
+    return table && std::ranges::any_of(table->bits, [](UINT8 count) { return count > 0; });
+  };
+  for (int i = 0; i < 2; ++i) {
+    const JQUANT_TBL* quantisers = codec.quant_tbl_ptrs[i];
+    if (!quantisers || std::ranges::count(quantisers->quantval, 0) > 0 ||
+        !has_codes(codec.dc_huff_tbl_ptrs[i]) || !has_codes(codec.ac_huff_tbl_ptrs[i]))
+      return "a table is missing";
+  }
+  return nullptr;
 }
 
 // Whether the header says what our tiles are; everything else libjpeg would have to convert or to collect.
@@ -254,9 +281,11 @@ const char* JpegDecompressor::Impl::read(std::span<const uint8_t> tables, std::s
                                          YuvImage& picture) {
   if (setjmp(errors.jump)) return errors.text.data();
   codec.err->num_warnings = 0;
+  forget_tables();
   jpeg_mem_src(&codec, tables.data(), tables.size());
   if (jpeg_read_header(&codec, FALSE) != JPEG_HEADER_TABLES_ONLY)
     return "the tables' part holds a picture as well";
+  if (const char* wrong = check_tables()) return wrong;
   jpeg_mem_src(&codec, tile.data(), tile.size());
   jpeg_read_header(&codec, TRUE);
   if (const char* wrong = check(picture)) return wrong;

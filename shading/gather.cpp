@@ -173,6 +173,7 @@ void Gather::Impl::record_compute(gpu::Commands& commands, const scene::SceneIns
 void Gather::Impl::record_raster(gpu::Commands& commands, const scene::SceneInstant& instant, PassPush push,
                                  const GatherWork& work) {
   if (work.raster_batches.empty()) return;
+  commands.barrier();  // a render pass loads and stores all of the atlas, what others wrote included
   const gpu::ColorAttachment atlas{.image = &image};
   commands.begin_rendering({.colors = {&atlas, 1}, .width = settings.width, .height = settings.height});
   for (const DrawBatch& batch : work.raster_batches) {
@@ -186,6 +187,7 @@ void Gather::Impl::record_raster(gpu::Commands& commands, const scene::SceneInst
 void Gather::Impl::record_tessellation(gpu::Commands& commands, const scene::SceneInstant& instant,
                                        PassPush push, const GatherWork& work) {
   if (work.tessellation_batches.empty()) return;
+  commands.barrier();
   commands.begin_rendering({.width = 1, .height = 1});  // nothing is rasterised
   for (const DrawBatch& batch : work.tessellation_batches) {
     commands.bind(*tessellation,

@@ -134,6 +134,13 @@ TEST(ClientCore, ABrokenVideoChainIsNotShownUntilTheNextKeyFrame) {
   }
 }
 
+TEST(ClientCore, RefusesAtlasesLargerThanTheSessions) {
+  const auto stream = make_stream(1, {0});
+  auto core = ClientCore::create(AtlasCodec::h264, kSide / 2, kSide / 2);
+  ASSERT_TRUE(core.ok()) << core.status();
+  EXPECT_EQ((*core)->on_atlas(stream[0].atlas).status().code(), absl::StatusCode::kResourceExhausted);
+}
+
 TEST(ClientCore, StaysUsableAfterNoise) {
   const auto stream = make_stream(3, {0, 1, 2});
   auto core = make_core();

@@ -9,7 +9,9 @@
 
 #include "codec/jpeg_decoder.h"
 #include "codec/jpeg_encoder.h"
+#include "codec/jpeg_tile.h"
 #include "codec/mcu_tiles.h"
+#include "codec/picture_packet.h"
 #include "codec/yuv.h"
 #include "pictures.h"
 
@@ -124,6 +126,47 @@ TEST(JpegCodec, BudgetsAreKept) {
     EXPECT_GE(8.0 * static_cast<double>(unit->bytes.size()), 0.9 * budget) << "frame " << n;
     ++n;
   }
+}
+
+// What the encoder plans by is a sample; its places must not be those of a few columns.
+TEST(JpegCodec, BudgetsAreKeptWhereTheAtlasIsFlatInPart) {
+  for (const uint32_t side : {512u, 1024u}) {
+    YuvImage picture = atlas_picture(side, side, 0, 30);
+    for (uint32_t y = 0; y < side; ++y)
+      for (const uint32_t x : {0u, side / 2}) std::fill_n(&picture.y[size_t{y} * side + x], 64, uint8_t{128});
+    const double budget = 0.6 * side * side;
+    const double bits = 8.0 * static_cast<double>(encode(view_of(picture), budget).size());
+    EXPECT_LE(bits, budget) << side;
+    EXPECT_GE(bits, 0.85 * budget) << side;
+  }
+}
+
+// The longest codes for the most coefficients: no picture is too large for the compressor.
+TEST(JpegCodec, CodesForAFlatPictureCodeNoise) {
+  JpegCompressor compressor;
+  const auto codes = compressor.codes_for(grey(256, 256, 128), kFinestScale);
+  ASSERT_TRUE(codes.ok()) << codes.status();
+  const YuvImage noise = noise_picture(256, 256, 1);
+  const auto tables = compressor.tables(kFinestScale, *codes);
+  const auto tile = compressor.compress(noise, kFinestScale, *codes);
+  ASSERT_TRUE(tables.ok() && tile.ok()) << tile.status();
+  EXPECT_GT(tile->size(), 3 * noise.y.size()) << "else this tests nothing";
+  YuvImage decoded;
+  resize(256, 256, decoded);
+  ASSERT_TRUE(JpegDecompressor().decompress(*tables, *tile, decoded).ok());
+  EXPECT_GT(psnr(view_of(noise), view_of(decoded)), 40);
+}
+
+TEST(JpegCodec, APictureBringsItsOwnTables) {
+  const Bytes whole = encode(view_of(atlas_picture(64, 64, 0, 0)));
+  auto picture = read_packet(whole, {});
+  ASSERT_TRUE(picture.ok()) << picture.status();
+  const Bytes none = {0xff, 0xd8, 0xff, 0xd9};
+  picture->tables = none;
+  JpegDecoder decoder(8192, 8192);
+  ASSERT_TRUE(decoder.decode(whole).ok());
+  EXPECT_EQ(decoder.decode(write_packet(*picture)).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_TRUE(decoder.decode(whole).ok());
 }
 
 TEST(JpegCodec, BudgetsOutOfReachGiveTheCoarsestOrTheFinestPicture) {

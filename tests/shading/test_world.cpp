@@ -34,7 +34,9 @@ void check(const Status& status) {
 }  // namespace
 
 gpu::Device& device() {
-  if (!shared_device) shared_device = value(gpu::Device::create({.select = "cpu", .validation = true}));
+  if (!shared_device)
+    shared_device =
+        value(gpu::Device::create({.select = "cpu", .validation = true, .validate_synchronization = true}));
   return *shared_device;
 }
 
