@@ -50,7 +50,7 @@ struct LayoutStats {
   uint64_t stack_texels = 0;  // fragmented: free, but not for every block
   uint32_t blocks = 0, colors = 0, colors_out_of_memory = 0;
   uint32_t halves = 0;         // among the blocks: triangles of kind halves
-  uint32_t blocks_halved = 0;  // placed in this frame smaller than wished, for want of memory (layout blocks)
+  uint32_t blocks_halved = 0;  // placed in this frame smaller than wished, for want of memory
   uint32_t changed = 0, removed = 0;
   bool reset = false;  // this frame re-placed everything, or a stage of it
   uint32_t resets_total = 0;

@@ -9,11 +9,13 @@
 namespace tessera::atlas::coherent {
 namespace {
 
-constexpr uint32_t kMaxSide = 8192;  // texels
-constexpr uint64_t kStages = 16;     // of re-placing the atlas: a frame moves at most this part of it
-constexpr float kFullest = 0.75f;    // slabs with a larger share in use are not worth emptying
-constexpr int kFirstTries = 16;      // to find a place for all in the first frame
-constexpr int kPauseFrames = 15;     // between two stages that helped nobody
+constexpr uint32_t kMaxSide = 8192;    // texels
+constexpr uint64_t kStages = 16;       // of re-placing the atlas: a frame moves at most this part of it
+constexpr float kFullest = 0.75f;      // slabs with a larger share in use are not worth emptying
+constexpr int kFirstTries = 16;        // to find a place for all in the first frame
+constexpr int kPauseFrames = 15;       // after a stage that served no need, after a rectangle could not grow
+constexpr int kMostPauseFrames = 240;  // doubled for each stage in a row that helped nobody
+constexpr int kHalvings = 3;           // of a rectangle's area, where there is no room for all of it
 
 Status check(const LayoutSettings& s) {
   for (const uint32_t side : {s.width, s.height}) {
@@ -33,7 +35,12 @@ RectangleSize size_of(const Placement& p) {
 
 struct Layout::Impl {
   Impl(const scene::Scene& s, const LayoutSettings& l)
-      : scene(s), settings(l), traits(s), slabs(l.width, l.height), target(l.width * double(l.height)) {}
+      : scene(s),
+        settings(l),
+        traits(s),
+        slabs(l.width, l.height),
+        target(l.width * double(l.height)),
+        most(most_sides(l.width, l.height)) {}
 
   LayoutDelta update(const LayoutInput& input);
   void place(const LayoutInput& input);
@@ -42,6 +49,10 @@ struct Layout::Impl {
   void choose(const LayoutInput& input);
   void choose_one(scene::PatchId patch, const Wanted& wanted, const Placement* was, const Spacing& spacing);
   void allocate();
+  bool take_place(Placement& p);
+  bool take_smaller_place(Placement& p, const Wanted& want);
+  void set_size(Placement& p, const RectangleSize& size) const;
+  void plan_stage();
   void count(const LayoutDelta& delta);
   void plan_next_frame();
   void free(const Placement& p) {
@@ -55,8 +66,11 @@ struct Layout::Impl {
   AdaptiveTarget target;
   BiasFollower bias;
   LayoutStats stats;
-  bool memory_short = false;  // after the last frame: rectangles may not grow
-  int frames_to_next_stage = 0, frames_since_shrink = kPauseFrames;
+  MostSides most;
+  bool memory_short = false;  // after the last frame
+  int frames_to_growth = 0;   // until then, or while memory is short, rectangles may not grow
+  int frames_to_next_stage = 0, stage_pause = 1, frames_since_shrink = kPauseFrames;
+  size_t starved_before = 0;  // the last stage
 
   std::vector<Placement> now, before;   // sorted by patch
   std::vector<scene::PatchId> starved;  // without a rectangle for want of memory; sorted
@@ -85,7 +99,8 @@ void Layout::Impl::place(const LayoutInput& input) {
 // rectangles leave more room unused than the target allows for.
 void Layout::Impl::fit_first_frame(const LayoutInput& input) {
   const float max_bias = settings.levels.max_bias;
-  for (int tries = 0; !starved.empty() && stats.bias < max_bias && tries < kFirstTries; ++tries) {
+  const auto all_fit = [this] { return starved.empty() && stats.blocks_halved == 0; };
+  for (int tries = 0; !all_fit() && stats.bias < max_bias && tries < kFirstTries; ++tries) {
     target.on_out_of_memory();
     slabs = Slabs(settings.width, settings.height);
     bias = {};
@@ -102,7 +117,7 @@ void Layout::Impl::follow_bias(const scene::VisiblePatches& visible) {
     wanted.push_back({rectangle_need(v.footprint, t.triangle_count), t.masked});
     stats.ideal_texels += wanted.back().need.area * (t.masked ? 2 : 1);
   }
-  stats.bias = bias.follow(select_bias(wanted, target.texels(), settings.levels));
+  stats.bias = bias.follow(select_bias(wanted, target.texels(), settings.levels, most));
 }
 
 // Merges the visible patches with those of the last frame.
@@ -138,7 +153,7 @@ void Layout::Impl::choose_one(scene::PatchId patch, const Wanted& want, const Pl
       was && !moves && (had_place || !std::binary_search(starved.begin(), starved.end(), patch));
   const RectangleSize held = had_place ? size_of(*was) : RectangleSize{};
   const RectangleSize size =
-      select_size(want.need, want.masked, stats.bias, anchored ? &held : nullptr, settings.levels);
+      select_size(want.need, want.masked, stats.bias, anchored ? &held : nullptr, settings.levels, most);
 
   const auto index = static_cast<uint32_t>(now.size());
   Placement& p = now.emplace_back(Placement{.patch = patch, .masked = want.masked});
@@ -147,19 +162,47 @@ void Layout::Impl::choose_one(scene::PatchId patch, const Wanted& want, const Pl
     return;
   }
   const uvec2 sides = sides_of(size, want.masked);
-  const bool waits = memory_short && had_place && !moves && sides.x * sides.y > was->texels();
+  const bool waits =
+      (memory_short || frames_to_growth > 0) && had_place && !moves && sides.x * sides.y > was->texels();
   if (had_place && !moves && (size == held || waits)) {
     p = *was;
     if (!still_good(was->spacing, spacing)) p.spacing = spacing;
     return;
   }
+  set_size(p, size);
+  p.spacing = spacing;
+  if (had_place) free(*was);
+  (had_place ? moving : entering).push_back(index);
+}
+
+void Layout::Impl::set_size(Placement& p, const RectangleSize& size) const {
+  const uvec2 sides = sides_of(size, p.masked);
   p.kind = PlacementKind::block;
   p.width = static_cast<uint16_t>(sides.x);
   p.height = static_cast<uint16_t>(sides.y);
   p.transposed = size.u > size.v;  // the short side is the width
-  p.spacing = spacing;
-  if (had_place) free(*was);
-  (had_place ? moving : entering).push_back(index);
+}
+
+bool Layout::Impl::take_place(Placement& p) {
+  const auto at = slabs.allocate(p.width, p.height);
+  if (!at) return false;
+  p.x = static_cast<uint16_t>(at->x);
+  p.y = static_cast<uint16_t>(at->y);
+  return true;
+}
+
+// Fewer samples show less than they should, a single colour still less.
+bool Layout::Impl::take_smaller_place(Placement& p, const Wanted& want) {
+  for (int halvings = 1; halvings <= kHalvings; ++halvings) {
+    const float bias_here = stats.bias + static_cast<float>(halvings);
+    const RectangleSize size = select_size(want.need, want.masked, bias_here, nullptr, settings.levels, most);
+    if (size.single_color()) return false;
+    set_size(p, size);
+    if (!take_place(p)) continue;
+    ++stats.blocks_halved;
+    return true;
+  }
+  return false;
 }
 
 void Layout::Impl::allocate() {
@@ -169,18 +212,15 @@ void Layout::Impl::allocate() {
     return now[a].width != now[b].width ? now[a].width > now[b].width : a < b;
   };
   starved.clear();
+  stats.blocks_halved = 0;
   // Who had a place comes first: losing it would show more than not getting one.
   for (auto* list : {&moving, &entering}) {
     std::sort(list->begin(), list->end(), wider);
     for (const uint32_t index : *list) {
       Placement& p = now[index];
-      if (const auto at = slabs.allocate(p.width, p.height)) {
-        p.x = static_cast<uint16_t>(at->x);
-        p.y = static_cast<uint16_t>(at->y);
-      } else {
-        p = {.patch = p.patch, .masked = p.masked};
-        starved.push_back(p.patch);
-      }
+      if (take_place(p) || take_smaller_place(p, wanted[index])) continue;
+      p = {.patch = p.patch, .masked = p.masked};
+      starved.push_back(p.patch);
     }
   }
   std::sort(starved.begin(), starved.end());
@@ -199,18 +239,27 @@ void Layout::Impl::count(const LayoutDelta& delta) {
   stats.removed = static_cast<uint32_t>(delta.removed.size());
 }
 
-// Chooses the slabs that the next frame empties, and calibrates the target (thesis 3.5).
+// Chooses the slabs that the next frame empties. While patches starve, one stage follows the other as long as
+// that helps them: what is moved costs bits, and its samples change places.
+void Layout::Impl::plan_stage() {
+  if (frames_to_next_stage > 0) --frames_to_next_stage;
+  if (!memory_short || frames_to_next_stage > 0) return;
+  const bool helps = starved.size() < starved_before;
+  starved_before = starved.size();
+  stage_pause = starved.empty() ? kPauseFrames : helps ? 1 : std::min(2 * stage_pause, kMostPauseFrames);
+  frames_to_next_stage = stage_pause;
+  stats.reset = slabs.close_emptiest(uint64_t{settings.width} * settings.height / kStages, kFullest);
+  if (stats.reset) ++stats.resets_total;
+}
+
+// Also calibrates the target (thesis 3.5).
 void Layout::Impl::plan_next_frame() {
-  const bool is_starved = !starved.empty();
+  const bool is_starved = !starved.empty() || stats.blocks_halved > 0;
   memory_short = is_starved || slabs.free_share() < 1 - settings.high_water;
   stats.reset = false;
-  if (frames_to_next_stage > 0) --frames_to_next_stage;
-  if (memory_short && frames_to_next_stage == 0) {
-    slabs.close_emptiest(uint64_t{settings.width} * settings.height / kStages, kFullest);
-    stats.reset = true;
-    ++stats.resets_total;
-    frames_to_next_stage = is_starved ? 1 : kPauseFrames;
-  }
+  plan_stage();
+  if (frames_to_growth > 0) --frames_to_growth;
+  if (is_starved) frames_to_growth = kPauseFrames;
   ++frames_since_shrink;
   if (is_starved && frames_since_shrink >= kPauseFrames) {
     target.on_out_of_memory();

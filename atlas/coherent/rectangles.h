@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "atlas/coherent/slabs.h"
 #include "atlas/level_selection.h"
 
 namespace tessera::atlas::coherent {
@@ -23,9 +24,15 @@ struct RectangleSize {
   bool operator==(const RectangleSize&) const = default;
 };
 
+// The largest sides that a rectangle may have, in texels: those of a shelf, or of a smaller atlas.
+struct MostSides {
+  uint16_t width = kShelfHeight, height = kShelfHeight;
+};
+MostSides most_sides(uint32_t atlas_width, uint32_t atlas_height);
+
 // The size at a bias (as in eq. 3.3: 1 halves the area); `previous` (or nullptr) anchors the hysteresis.
 RectangleSize select_size(const RectangleNeed& need, bool masked, float bias, const RectangleSize* previous,
-                          const LevelSettings& settings);
+                          const LevelSettings& settings, const MostSides& most = {});
 
 // Sides in the atlas, with coverage: the short one is the width.
 uvec2 sides_of(const RectangleSize& size, bool masked);
@@ -36,6 +43,7 @@ struct Wanted {
   RectangleNeed need;
   bool masked = false;
 };
-float select_bias(std::span<const Wanted> wanted, double target_texels, const LevelSettings& settings);
+float select_bias(std::span<const Wanted> wanted, double target_texels, const LevelSettings& settings,
+                  const MostSides& most = {});
 
 }  // namespace tessera::atlas::coherent

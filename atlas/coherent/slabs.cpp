@@ -123,7 +123,7 @@ void Slabs::release(uint32_t index) {
   unused_.push_back(index);
 }
 
-void Slabs::close_emptiest(uint64_t budget_texels, float fullest) {
+bool Slabs::close_emptiest(uint64_t budget_texels, float fullest) {
   struct Candidate {
     float share;
     uint32_t index;
@@ -139,13 +139,15 @@ void Slabs::close_emptiest(uint64_t budget_texels, float fullest) {
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.share != b.share ? a.share < b.share : a.index < b.index;
   });
+  bool closed = false;
   for (const Candidate& candidate : candidates) {
     Slab& slab = slabs_[candidate.index];
     const uint64_t texels = uint64_t{slab.used} * slab.width * kUnit * kUnit;
-    if (texels > budget_texels) return;
+    if (texels > budget_texels) continue;
     budget_texels -= texels;
-    slab.closed = true;
+    slab.closed = closed = true;
   }
+  return closed;
 }
 
 void Slabs::reopen() {

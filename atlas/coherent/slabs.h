@@ -40,8 +40,8 @@ class Slabs {
 
   // Closes the emptiest slabs to allocate(), together holding at most `budget_texels` in rectangles: once
   // these are freed and placed elsewhere, the slabs return to the shelves. Slabs above `fullest` (share in
-  // use) stay open.
-  void close_emptiest(uint64_t budget_texels, float fullest);
+  // use) stay open. Returns whether any was closed.
+  bool close_emptiest(uint64_t budget_texels, float fullest);
   bool closed(uvec2 at) const { return slab_at(at).closed; }
   void reopen();
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <random>
+#include <ranges>
 
 #include "atlas/coherent/rectangles.h"
 #include "atlas/coherent/spacing.h"
@@ -117,6 +118,66 @@ TEST_F(CoherentLayout, WhatStaysVisibleStaysInPlace) {
   VisiblePatches fewer = rectangles(200, 20, 12);
   std::erase_if(fewer, [](const auto& v) { return v.patch % 3 == 0; });
   EXPECT_TRUE(update(fewer).changed.empty());
+}
+
+TEST_F(CoherentLayout, WhatCannotGrowKeepsSamplesAndThenItsPlace) {
+  LayoutSettings settings{.width = 640, .height = 256};
+  settings.levels.min_bias = settings.levels.max_bias = 0;
+  make(3, settings);
+  VisiblePatches visible = rectangles(3, 191, 191);
+  update(visible);
+  ASSERT_EQ(layout_->stats().blocks, 3u);
+  visible[1].footprint = {255, 255, 255 * 255};
+  uint32_t moved = 0;
+  for (int frame = 0; frame < 60; ++frame) {
+    moved += !update(visible).changed.empty();
+    EXPECT_EQ(layout_->stats().blocks, 3u) << frame;
+    EXPECT_GE(mirror_.at(1).texels(), 128u * 128) << frame;
+  }
+  EXPECT_LE(moved, 6u) << "it tries again now and then";
+}
+
+TEST_F(CoherentLayout, SmallAtlasesHoldWhatTheyCan) {
+  for (const auto& [width, height] :
+       {std::pair{2048u, 128u}, {128u, 2048u}, {64u, 64u}, {2u, 256u}, {256u, 2u}, {320u, 320u}}) {
+    mirror_.clear();
+    make(2, {.width = width, .height = height});
+    for (const VisiblePatches& visible : {VisiblePatches{{0, {40, 200, 8000}}, {1, {300, 300, 90000}}},
+                                          VisiblePatches{{0, {900, 3, 2700}}, {2, {500, 500, 250000}}}}) {
+      update(visible);
+      EXPECT_EQ(layout_->stats().colors_out_of_memory, 0u) << width << "x" << height;
+      EXPECT_GT(layout_->stats().blocks, 0u) << width << "x" << height;
+    }
+  }
+}
+
+// Every third patch stays, so that all slabs are a third full; then wide ones come that only emptied slabs
+// have room for.
+TEST_F(CoherentLayout, StagesMakeRoomAndMoveLittleAFrame) {
+  LayoutSettings settings{.width = 1024, .height = 512};
+  settings.levels.min_bias = settings.levels.max_bias = 0;
+  make(600, settings);
+  update(rectangles(600, 23, 31));
+  VisiblePatches visible = rectangles(600, 23, 31);
+  std::erase_if(visible, [](const auto& v) { return v.patch % 3 != 0; });
+  update(visible);
+  for (uint32_t i = 0; i < 7; ++i) visible.push_back({600 + i, {120, 120, 14400}});
+  const auto all_large = [&] {
+    return std::ranges::all_of(std::views::iota(600u, 607u), [&](scene::PatchId patch) {
+      return mirror_.at(patch).texels() >= 2 * 120u * 120;
+    });
+  };
+  uint32_t frames = 0;
+  do {
+    const auto before = mirror_;
+    uint64_t moved = 0;
+    for (const Placement& p : update(visible).changed)
+      if (before.contains(p.patch) && p.patch < 600) moved += p.texels();
+    EXPECT_LE(moved, 1024u * 512 / 16) << frames;
+    EXPECT_GE(layout_->stats().blocks, 200u) << "what has a place keeps one";
+  } while (!all_large() && ++frames < 150);
+  EXPECT_GT(frames, 0u) << "else this tests nothing";
+  EXPECT_LT(frames, 150u);
 }
 
 TEST_F(CoherentLayout, SpacingIsFrozenWhileItIsGood) {

@@ -81,6 +81,15 @@ TEST(Slabs, ANarrowRectangleTakesAWiderSlabBeforeItGoesWithout) {
   EXPECT_EQ(slabs.stats().used_texels, 0u);
 }
 
+TEST(Slabs, WhatABudgetIsTooSmallForStopsNoOther) {
+  Slabs slabs(256, 256);
+  const uvec2 wide = *slabs.allocate(192, 60), narrow = *slabs.allocate(16, 128);
+  EXPECT_FALSE(slabs.close_emptiest(1024, 0.75f)) << "each holds more";
+  EXPECT_TRUE(slabs.close_emptiest(4096, 0.75f));
+  EXPECT_TRUE(slabs.closed(narrow)) << "though it is fuller";
+  EXPECT_FALSE(slabs.closed(wide));
+}
+
 TEST(Slabs, ClosedSlabsAreTheEmptiestAndTakeNothing) {
   Slabs slabs(64, 256);
   const uvec2 full = *slabs.allocate(16, 256), half = *slabs.allocate(32, 128),
