@@ -1,7 +1,6 @@
 #include "bench/texel_picture.h"
 
 #include <algorithm>
-#include <glm/gtc/color_space.hpp>
 
 #include "client-sdk/drawer.h"
 
@@ -22,8 +21,8 @@ View shifted(View view, vec2 pixels) {
   return view;
 }
 
-vec3 linear_of(const uint8_t* rgb) {
-  return glm::convertSRGBToLinear(vec3(rgb[0], rgb[1], rgb[2]) / 255.0f);
+vec3 color_of(const uint8_t* rgb) {
+  return {rgb[0], rgb[1], rgb[2]};
 }
 
 // The shaded texels of a picture.
@@ -51,7 +50,7 @@ class Texels {
     return samples;
   }
 
-  // Linear; bilinear among the texels that show something.
+  // Bilinear among the texels that show something.
   vec3 read(const TexelLookup& at) const {
     const vec2 base = glm::floor(at.position), part = at.position - base;
     const ivec2 last = ivec2(texture_.size(at.instance, at.level)) - 1;
@@ -62,7 +61,7 @@ class Texels {
       const float weight = (step.x ? part.x : 1 - part.x) * (step.y ? part.y : 1 - part.y);
       const uint32_t color = at_texel(at, glm::clamp(ivec2(base) + step, ivec2(0), last));
       if (color == 0) continue;
-      sum += weight * linear_of(reinterpret_cast<const uint8_t*>(&color));
+      sum += weight * color_of(reinterpret_cast<const uint8_t*>(&color));
       weights += weight;
     }
     return weights > 0 ? sum / weights : vec3(0);
@@ -83,11 +82,10 @@ class Texels {
   std::vector<uint32_t> colors_;
 };
 
-Image8 encoded(const View& view, std::span<const vec3> linear) {
+Image8 rounded(const View& view, std::span<const vec3> colors) {
   Image8 image(view.width, view.height);
-  for (size_t i = 0; i < linear.size(); ++i) {
-    const vec3 srgb = glm::convertLinearToSRGB(glm::clamp(linear[i], 0.0f, 1.0f));
-    for (int c = 0; c < 3; ++c) image.rgba[4 * i + c] = static_cast<uint8_t>(255 * srgb[c] + 0.5f);
+  for (size_t i = 0; i < colors.size(); ++i) {
+    for (int c = 0; c < 3; ++c) image.rgba[4 * i + c] = static_cast<uint8_t>(colors[i][c] + 0.5f);
     image.rgba[4 * i + 3] = 255;
   }
   return image;
@@ -109,7 +107,7 @@ StatusOr<TexelPicture> draw_texels(const UniqueTexture& texture, TexelShader& sh
   TexelPicture out;
   TESSERA_ASSIGN_OR_RETURN(out.samples, texels.shade(shader, truth.instant(), view));
 
-  const vec3 background = linear_of(client::kDefaultBackground.data());
+  const vec3 background = color_of(client::kDefaultBackground.data());
   std::vector<vec3> sum(size_t{view.width} * view.height, vec3(0));
   for (size_t i = 0; i < ids.size(); ++i) {
     const View at = shifted(view, kPoints[i]);
@@ -121,7 +119,7 @@ StatusOr<TexelPicture> draw_texels(const UniqueTexture& texture, TexelShader& sh
       sum[p] += color / static_cast<float>(ids.size());
     }
   }
-  out.image = encoded(view, sum);
+  out.image = rounded(view, sum);
   return out;
 }
 

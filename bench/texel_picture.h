@@ -1,4 +1,5 @@
 // The picture that texel shading shows (TSS section 5): each pixel reads the shaded texels at four points.
+// Filters and averages colours as they are encoded, as the client and the reference do.
 #pragma once
 
 #include "bench/texel_shader.h"

@@ -29,7 +29,7 @@ CameraPath pipe_path();
 // `spec` is a glTF file's path, or `gallery[:detail]`, or `city[:triangles]`, or `pipe`.
 StatusOr<std::shared_ptr<Scene>> load_scene(const std::string& spec);
 bool is_procedural(const std::string& spec);  // not a file
-// `spec` is a CSV file's path, or `gallery`, or `city`, or `pipe`.
+// `spec` is a CSV file's path, or `gallery`, or `city`, or `pipe`. Its time counts from its first pose.
 StatusOr<CameraPath> load_path(const std::string& spec);
 
 }  // namespace tessera::scene

@@ -56,6 +56,7 @@ Status AtlasTexture::resize(uint32_t width, uint32_t height) {
     return absl::InvalidArgumentError(absl::StrCat(
         "an atlas of ", width, "x", height, " does not fit the display device (1 to ", limit, " a side)"));
   }
+  width_ = height_ = 0;  // until there is one, so that a failure is not forgotten
   rgba_ = make_texture();
   set_sampling(rgba_, GL_LINEAR);
   glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, static_cast<GLsizei>(width), static_cast<GLsizei>(height), 0,
@@ -68,8 +69,9 @@ Status AtlasTexture::resize(uint32_t width, uint32_t height) {
   return absl::OkStatus();
 }
 
-void AtlasTexture::resize_planes() {
-  if (plane_width_ == width_ && plane_height_ == height_) return;
+Status AtlasTexture::resize_planes() {
+  if (plane_width_ == width_ && plane_height_ == height_) return absl::OkStatus();
+  plane_width_ = plane_height_ = 0;
   for (int i = 0; i < 3; ++i) {
     planes_[i] = make_texture();
     set_sampling(planes_[i], GL_NEAREST);
@@ -77,8 +79,10 @@ void AtlasTexture::resize_planes() {
     glTexImage2D(GL_TEXTURE_2D, 0, GL_R8, static_cast<GLsizei>(width_) / divisor,
                  static_cast<GLsizei>(height_) / divisor, 0, GL_RED, GL_UNSIGNED_BYTE, nullptr);
   }
+  TESSERA_RETURN_IF_ERROR(check_errors("allocation of the atlas's planes"));
   plane_width_ = width_;
   plane_height_ = height_;
+  return absl::OkStatus();
 }
 
 Status AtlasTexture::set(const YuvView& atlas) {
@@ -88,7 +92,7 @@ Status AtlasTexture::set(const YuvView& atlas) {
   }
   TESSERA_RETURN_IF_ERROR(resize(atlas.width, atlas.height));
   glActiveTexture(GL_TEXTURE0);
-  resize_planes();
+  TESSERA_RETURN_IF_ERROR(resize_planes());
   upload_plane(planes_[0], atlas.y, atlas.y_stride, atlas.width, atlas.height);
   upload_plane(planes_[1], atlas.u, atlas.uv_stride, atlas.width / 2, atlas.height / 2);
   upload_plane(planes_[2], atlas.v, atlas.uv_stride, atlas.width / 2, atlas.height / 2);

@@ -27,7 +27,7 @@ class AtlasTexture {
  private:
   AtlasTexture() = default;
   Status resize(uint32_t width, uint32_t height);
-  void resize_planes();
+  Status resize_planes();
 
   uint32_t width_ = 0, height_ = 0;
   uint32_t plane_width_ = 0, plane_height_ = 0;  // 0 until the atlas first comes as YUV

@@ -38,6 +38,7 @@ Status TableTexture::grow(size_t rows) {
   }
   const size_t held_rows = content_.size() / (kWidth * format_.bytes);
   const size_t new_rows = std::min(std::max(rows, 2 * held_rows), static_cast<size_t>(max_rows));
+  content_.clear();  // until there is a texture that holds it, so that a failure is not forgotten
   texture_ = make_texture();
   set_sampling(texture_, GL_NEAREST);
   glTexImage2D(GL_TEXTURE_2D, 0, format_.internal_format, kWidth, static_cast<GLsizei>(new_rows), 0,

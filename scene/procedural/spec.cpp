@@ -51,7 +51,10 @@ StatusOr<CameraPath> load_path(const std::string& spec) {
   if (spec == "gallery") return gallery_path();
   if (spec == "city") return city_path();
   if (spec == "pipe") return pipe_path();
-  return CameraPath::load(spec);
+  TESSERA_ASSIGN_OR_RETURN(const CameraPath recorded, CameraPath::load(spec));
+  std::vector<TimedPose> poses = recorded.poses();
+  for (TimedPose& pose : poses) pose.time_ns -= recorded.poses().front().time_ns;
+  return CameraPath(std::move(poses));
 }
 
 }  // namespace tessera::scene

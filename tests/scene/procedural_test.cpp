@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include <cmath>
 
 namespace tessera::scene {
@@ -127,6 +129,15 @@ TEST(Specs, NamesAndErrors) {
     EXPECT_FALSE(load_scene(wrong).ok()) << wrong;
   }
   EXPECT_FALSE(load_path("missing.csv").ok());
+}
+
+TEST(Specs, APathBeginsAtZero) {
+  const std::string file = testing::TempDir() + "/late_path.csv";
+  std::ofstream(file) << "t_seconds,px,py,pz,qx,qy,qz,qw\n12.5,1,2,3,0,0,0,1\n13,2,2,3,0,0,0,1\n";
+  const auto path = load_path(file);
+  ASSERT_TRUE(path.ok()) << path.status();
+  EXPECT_EQ(path->poses().front().time_ns, 0);
+  EXPECT_EQ(path->at(from_seconds(0.25)).position.x, 1.5);
 }
 
 }  // namespace
