@@ -164,8 +164,10 @@ Status Study::add_load(GatherRow row, std::vector<Placement> placements) {
     row.outside = static_cast<double>(stats.half_samples_outside) / static_cast<double>(stats.half_samples);
   std::vector<GatherPath> paths(std::begin(shading::kGatherPaths), std::end(shading::kGatherPaths));
   if (row.group == "layouts") paths.push_back(GatherPath::automatic);  // others have one shape and size
+  // It computes blocks.
+  const bool only_blocks = row.group == "blocks" || (row.group == "layouts" && row.name != "tessellated");
   for (const GatherPath path : paths) {
-    if (path == GatherPath::tessellation && (row.group == "blocks" || !tessellates_)) continue;
+    if (path == GatherPath::tessellation && (only_blocks || !tessellates_)) continue;
     row.path = name_of(path);
     cases_.push_back({.row = row, .shade = [this, load, path] { return gather(*load, path); }});
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "atlas/addressing/addressing.h"
 #include "atlas/tessellated/packing.h"
@@ -73,7 +74,7 @@ class Packer {
   atlas::tessellated::HalfBin halves_;
 };
 
-// Spread over the scene.
+// Spread over the scene, and so is any part from the first on: large shapes need few.
 std::vector<LoadTriangle> opaque_triangles(const scene::Scene& scene) {
   std::vector<LoadTriangle> triangles;
   const uint32_t step = std::max(1u, scene.patch_count / kTriangles);
@@ -82,6 +83,7 @@ std::vector<LoadTriangle> opaque_triangles(const scene::Scene& scene) {
     if (scene.materials[instance.material].alpha_mode == scene::AlphaMode::opaque)
       triangles.push_back({patch, 0});
   }
+  std::shuffle(triangles.begin(), triangles.end(), std::minstd_rand(1));
   return triangles;
 }
 
