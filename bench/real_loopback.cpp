@@ -202,9 +202,10 @@ Status RealLoopback::wait_for_viewers() {
     }
     if (const int code = *viewer.program->exit_code(); code != 0)
       return failed("tessera-client", *viewer.program, code);
-    TESSERA_ASSIGN_OR_RETURN(viewer.records, viewer.frames->finish());
     viewer.report = json::parse(std::ifstream(file(absl::StrCat("client", i, ".json"))), nullptr, false);
     if (!viewer.report.is_object()) return absl::InternalError("tessera-client left no result");
+    TESSERA_ASSIGN_OR_RETURN(viewer.records,
+                             viewer.frames->finish(viewer.report.value("newest_frame", FrameNumber{0})));
   }
   return absl::OkStatus();
 }

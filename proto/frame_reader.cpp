@@ -60,7 +60,8 @@ Status FrameReader::read_rest(std::optional<FrameNumber> last) {
   context.set_deadline(std::chrono::system_clock::now() + kRestTimeout);
   const auto is_last = [&](const FrameRecord& record) { return record.frame == *last; };
   const Status status = read(context, !last, [&] { return last && std::ranges::any_of(records_, is_last); });
-  return last && absl::IsDeadlineExceeded(status) ? absl::OkStatus() : status;
+  if (!last || !absl::IsDeadlineExceeded(status)) return status;
+  return read_rest(std::nullopt);  // whether the daemon answers at all
 }
 
 StatusOr<std::vector<FrameRecord>> FrameReader::finish(std::optional<FrameNumber> last) {

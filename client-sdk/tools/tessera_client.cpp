@@ -285,6 +285,7 @@ StatusOr<nlohmann::json> view(const Settings& s) {
   const client::ConnectionStats stats = connection->stats();
   const Totals& totals = viewer.totals();
   return nlohmann::json{{"frames_displayed", totals.displayed},
+                        {"newest_frame", viewer.newest().value_or(0)},
                         {"frames_fresh", totals.fresh},
                         {"pictures", writer ? writer->written() : 0},
                         {"saved", totals.saved},
