@@ -321,6 +321,11 @@ Status SizeStudy::code() {
           TESSERA_ASSIGN_OR_RETURN(coders[c][f],
                                    Coder::create(kCodecs[c], size_, settings_.common.server_fps, bits));
         }
+        // As in a stream, where its memory is in use all the time: right after the picture before.
+        if (round > 0) {
+          const YuvImage& last = atlases_[(round - 1) % atlases_.size()];
+          TESSERA_RETURN_IF_ERROR(coders[c][f]->run(last, used, bits).status());
+        }
         TESSERA_ASSIGN_OR_RETURN(const Coded coded, coders[c][f]->run(picture, used, bits));
         if (round == 0) continue;
         Measured& m = measured[c][f];
