@@ -175,8 +175,8 @@ typedef struct TesseraStatistics { /* TESSERA_TYPE_STATISTICS */
   uint64_t packets;          /* of video */
   uint64_t packetsRecovered; /* lost, but sent again in time */
   uint64_t packetsLost;
-  uint64_t framesOrphaned;   /* of video; they came whole, but build on one that did not */
-  uint64_t decodeErrors;     /* damaged frames and geometry */
+  uint64_t framesOrphaned;  /* of video; they came whole, but build on one that did not */
+  uint64_t decodeErrors;    /* damaged frames and geometry */
   int64_t networkRoundTrip; /* ns; 0: not measured yet */
 } TesseraStatistics;
 
