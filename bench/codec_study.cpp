@@ -226,7 +226,7 @@ Status SizeStudy::stream(std::shared_ptr<server::SharedScene> scene, const Camer
   CodecPictureRow row{.codec = codec, .width = size_.width, .height = size_.height};
   for (FrameNumber n = 0; n < kPictures; ++n) {
     const TimeNs now = from_seconds(s.start_s + n / s.server_fps);
-    const TimedPose pose{now, path.at(path.poses().front().time_ns + now)};
+    const TimedPose pose{now, path.at(now)};
     TESSERA_ASSIGN_OR_RETURN(
         const std::vector<Packet> packets,
         streamer->serve(

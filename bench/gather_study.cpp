@@ -99,7 +99,7 @@ Status Study::set_up() {
   shared_ = on.shared;
   const TimeNs time = from_seconds(common.start_s);
   view_ = client_view(common);
-  view_.pose = on.path.at(on.path.poses().front().time_ns + time);
+  view_.pose = on.path.at(time);
   TESSERA_ASSIGN_OR_RETURN(instant_, scene::SceneInstant::create(*device_, shared_->gpu_scene()));
   instant_->set(time, view_.pose.position);
   TESSERA_RETURN_IF_ERROR(shared_->lighting().update(*instant_));

@@ -103,9 +103,7 @@ struct StreamSimulation::Impl {
   TimeNs display_path_time() const {
     return from_seconds(settings.start_s) + (started ? tick(scored, settings.fps) : 0);
   }
-  Pose pose_on_path(TimeNs path_time_ns) const {
-    return path.at(path.poses().front().time_ns + path_time_ns);
-  }
+  Pose pose_on_path(TimeNs path_time_ns) const { return path.at(path_time_ns); }
   Pose pose_at(TimeNs now) const { return pose_on_path(path_time(now)); }
 
   // Earliest thing that happens after the last one, and what it is; ties in this order.

@@ -31,6 +31,14 @@ RectangleSize size_of(const Placement& p) {
   return p.transposed ? RectangleSize{h, w} : RectangleSize{w, h};
 }
 
+void set_size(Placement& p, const RectangleSize& size) {
+  const uvec2 sides = sides_of(size, p.masked);
+  p.kind = PlacementKind::block;
+  p.width = static_cast<uint16_t>(sides.x);
+  p.height = static_cast<uint16_t>(sides.y);
+  p.transposed = size.u > size.v;  // the short side is the width
+}
+
 }  // namespace
 
 struct Layout::Impl {
@@ -51,7 +59,6 @@ struct Layout::Impl {
   void allocate();
   bool take_place(Placement& p);
   bool take_smaller_place(Placement& p, const Wanted& want);
-  void set_size(Placement& p, const RectangleSize& size) const;
   void plan_stage();
   void count(const LayoutDelta& delta);
   void plan_next_frame();
@@ -69,7 +76,7 @@ struct Layout::Impl {
   MostSides most;
   bool memory_short = false;  // after the last frame
   int frames_to_growth = 0;   // until then, or while memory is short, rectangles may not grow
-  int frames_to_next_stage = 0, stage_pause = 1, frames_since_shrink = kPauseFrames;
+  int frames_to_next_stage = 0, starved_pause = 1, frames_since_shrink = kPauseFrames;
   size_t starved_before = 0;  // the last stage
 
   std::vector<Placement> now, before;   // sorted by patch
@@ -175,14 +182,6 @@ void Layout::Impl::choose_one(scene::PatchId patch, const Wanted& want, const Pl
   (had_place ? moving : entering).push_back(index);
 }
 
-void Layout::Impl::set_size(Placement& p, const RectangleSize& size) const {
-  const uvec2 sides = sides_of(size, p.masked);
-  p.kind = PlacementKind::block;
-  p.width = static_cast<uint16_t>(sides.x);
-  p.height = static_cast<uint16_t>(sides.y);
-  p.transposed = size.u > size.v;  // the short side is the width
-}
-
 bool Layout::Impl::take_place(Placement& p) {
   const auto at = slabs.allocate(p.width, p.height);
   if (!at) return false;
@@ -243,11 +242,12 @@ void Layout::Impl::count(const LayoutDelta& delta) {
 // that helps them: what is moved costs bits, and its samples change places.
 void Layout::Impl::plan_stage() {
   if (frames_to_next_stage > 0) --frames_to_next_stage;
+  if (starved.empty()) starved_pause = 1;
   if (!memory_short || frames_to_next_stage > 0) return;
   const bool helps = starved.size() < starved_before;
   starved_before = starved.size();
-  stage_pause = starved.empty() ? kPauseFrames : helps ? 1 : std::min(2 * stage_pause, kMostPauseFrames);
-  frames_to_next_stage = stage_pause;
+  starved_pause = helps ? 1 : std::min(2 * starved_pause, kMostPauseFrames);
+  frames_to_next_stage = starved.empty() ? kPauseFrames : starved_pause;
   stats.reset = slabs.close_emptiest(uint64_t{settings.width} * settings.height / kStages, kFullest);
   if (stats.reset) ++stats.resets_total;
 }

@@ -106,6 +106,7 @@ TEST(ClientCore, PairsEveryFrameOfAnUndisturbedStream) {
   EXPECT_EQ(stats.atlas_frames, 12u);
   EXPECT_EQ(stats.meta_frames, 12u);
   EXPECT_EQ(stats.decode_errors, 0u);
+  EXPECT_EQ(stats.orphans, 0u);
   EXPECT_EQ(stats.pairs_skipped, 0u);
   EXPECT_EQ(stats.newest_pair, kStart + 11);
 }

@@ -47,6 +47,7 @@ value() { sed -n "s/.*\"$1\": *\([0-9]*\).*/\1/p" "$folder/run.json"; }
 [ "$(value packets_recovered)" -gt 0 ] || fail "nothing was lost and recovered: is netem at work?"
 [ $(($(value packets_given_up) * 50)) -le "$(value packets_recovered)" ] || fail "too many packets were given up"
 [ "$(value frames_fresh)" -ge 5 ] || fail "the picture stood still"
+[ "$(value orphans)" -lt 30 ] || fail "broken chains of frames were not mended"
 [ "$(value decode_errors)" -eq 0 ] || fail "access units could not be decoded"
 
 kill -TERM "$daemon"

@@ -2,9 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <fstream>
-
 #include <cmath>
+#include <fstream>
 
 namespace tessera::scene {
 namespace {

@@ -63,6 +63,7 @@ TEST_F(ConnectTest, AWholeSessionOverTlsAndSrtp) {
     newest = pair->frame;
   }
   EXPECT_EQ((*client)->stats().core.decode_errors, 0u);
+  EXPECT_EQ((*client)->stats().core.orphans, 0u);
 }
 
 // All four ports, not the stream's alone.

@@ -303,6 +303,7 @@ TEST_F(DaemonTest, TheViewerProgramWritesPictures) {
   const auto json = nlohmann::json::parse(in, nullptr, false);
   EXPECT_GT(json.value("frames_displayed", 0), 0);
   EXPECT_EQ(json.value("decode_errors", -1), 0);
+  EXPECT_EQ(json.value("orphans", -1), 0);
   EXPECT_EQ(run("--scene hall --codec jpeg --seconds 0.1 --json /dev/null"), 0);
   EXPECT_EQ(run("--scene hall --codec gif 2>/dev/null"), 2);
   EXPECT_EQ(run("--scene attic 2>/dev/null"), 1);

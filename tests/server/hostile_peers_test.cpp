@@ -36,6 +36,7 @@ class HostilePeersTest : public test::FakeStreamingTest {
     if (!client_) return;
     expect_pairs(*client_, 5);
     EXPECT_EQ(client_->stats().core.decode_errors, 0u);
+    EXPECT_EQ(client_->stats().core.orphans, 0u);
     client_.reset();
   }
 

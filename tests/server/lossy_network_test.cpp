@@ -65,6 +65,7 @@ TEST_P(LossyNetworkTest, RetransmissionKeepsThePictureGoing) {
   EXPECT_LT(stats.media.given_up * 50, stats.media.recovered);
   EXPECT_LE(key_frames, 3) << "retransmission comes first";
   RecordProperty("orphans", static_cast<int>(stats.core.orphans));
+  EXPECT_LT(stats.core.orphans, 30u) << "a broken chain is mended within a second";
   EXPECT_EQ(stats.core.decode_errors, 0u);
 }
 

@@ -56,6 +56,7 @@ TEST_F(StalledClientTest, TheAtlasGoesOnAndPairsComeBack) {
   }));
   EXPECT_GT(newest, last_whole + 100) << client_->status();
   EXPECT_EQ(client_->stats().core.decode_errors, 0u);
+  EXPECT_EQ(client_->stats().core.orphans, 0u);
   EXPECT_TRUE((*other)->status().ok()) << (*other)->status();
 }
 

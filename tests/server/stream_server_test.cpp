@@ -108,6 +108,7 @@ TEST_F(StreamServerTest, TwoClientsSeeNewerAndNewerPairs) {
   expect_pairs(**first, 5);
   other.join();
   EXPECT_EQ((*first)->stats().core.decode_errors, 0u);
+  EXPECT_EQ((*first)->stats().core.orphans, 0u);
 }
 
 TEST_F(StreamServerTest, TheServerLearnsTheRoundTripFromTheClient) {
@@ -503,6 +504,7 @@ TEST_P(CodecStreaming, PairsArriveWholeAndAKeyFrameRequestCostsNothing) {
   EXPECT_EQ((*client)->welcome().codec, GetParam());
   expect_pairs(**client, 5);
   EXPECT_EQ((*client)->stats().core.decode_errors, 0u);
+  EXPECT_EQ((*client)->stats().core.orphans, 0u);
   const StreamedSessionStats stats = *server_->stats(made.session);
   if (GetParam() != AtlasCodec::h264) {
     EXPECT_GE(stats.key_frames, stats.frames_sent);

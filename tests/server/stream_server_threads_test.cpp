@@ -71,6 +71,7 @@ TEST_F(StreamServerThreadsTest, EveryClientHasAStreamOfItsOwn) {
     before = client->welcome().stream;
     expect_pairs(*client, 2);
     EXPECT_EQ(client->stats().core.decode_errors, 0u);
+    EXPECT_EQ(client->stats().core.orphans, 0u);
   }
 }
 
@@ -164,6 +165,7 @@ TEST_F(StreamServerThreadsTest, StrangersDisturbNobody) {
   guesser.join();
   flooder.join();
   EXPECT_EQ((*client)->stats().core.decode_errors, 0u);
+  EXPECT_EQ((*client)->stats().core.orphans, 0u);
 }
 
 }  // namespace
