@@ -17,13 +17,13 @@ namespace {
 // the first.
 constexpr double kAim = 0.955, kGoodShare = 0.9;
 constexpr int kTries = 3, kMostTries = 8;  // with the whole picture: while one fits already; while none does
-constexpr int kPlanTries = 6;              // with its sample,
-constexpr double kPlanError = 0.01;        // or as near as that
+constexpr int kPlanTries = 6;              // with its sample, whose size
+constexpr double kFar = 0.08;              // off by more than this tells too little of the right scale
 
 // The sample: a run of squares in every n, at a place of its own in each: an even stride that divides the
 // atlas's rows would see a few of its columns alone. Runs are short, because neighbours are alike: the more
 // places, the better the sample stands for the whole.
-constexpr size_t kRunMcus = 4, kSampleEvery = 24, kMinSampleRuns = 64;
+constexpr size_t kRunMcus = 4, kSampleEvery = 12, kMinSampleRuns = 128;
 
 std::vector<uint32_t> sample_of(std::span<const uint32_t> mcus) {
   const size_t runs = (mcus.size() + kRunMcus - 1) / kRunMcus;
@@ -72,15 +72,16 @@ void JpegEncoder::gather_tiles(const AtlasPicture& picture) {
 
 StatusOr<JpegEncoder::Plan> JpegEncoder::plan_for(double bits) {
   const auto mcus = static_cast<double>(mcus_.size());
-  Plan plan;
+  double scale = search_.scale_for(bits / mcus);
   for (int tries = 1;; ++tries) {
-    plan.scale = search_.scale_for(bits / mcus);
-    TESSERA_ASSIGN_OR_RETURN(plan.codes, compressors_[0].codes_for(sample_, plan.scale));
-    TESSERA_ASSIGN_OR_RETURN(const auto tile, compressors_[0].compress(sample_, plan.scale, plan.codes));
-    plan.expected_bits = 8.0 * static_cast<double>(tile.size()) / sample_share_ * whole_to_sample_;
-    search_.learn(plan.scale, plan.expected_bits / mcus, tries > 1);
-    const bool near = std::abs(plan.expected_bits - bits) <= kPlanError * bits;
-    if (near || tries == kPlanTries || search_.scale_for(bits / mcus) == plan.scale) return plan;
+    TESSERA_ASSIGN_OR_RETURN(const auto fitted, compressors_[0].codes_for(sample_, scale));
+    const double sample_bits = 8.0 * static_cast<double>(fitted.bytes) / sample_share_;
+    const double expected = sample_bits * whole_to_sample_;
+    search_.learn(scale, expected / mcus, tries > 1);
+    const double better = search_.scale_for(bits / mcus);
+    if (std::abs(expected - bits) <= kFar * bits || tries == kPlanTries || better == scale)
+      return Plan{better, fitted.codes, search_.bits_per_mcu(better) * mcus};
+    scale = better;
   }
 }
 

@@ -198,11 +198,11 @@ JpegCompressor::JpegCompressor() : impl_(std::make_unique<Impl>()) {}
 JpegCompressor::~JpegCompressor() = default;
 JpegCompressor::JpegCompressor(JpegCompressor&&) noexcept = default;
 
-StatusOr<JpegCodes> JpegCompressor::codes_for(const YuvImage& picture, double scale) {
+StatusOr<JpegCompressor::Fitted> JpegCompressor::codes_for(const YuvImage& picture, double scale) {
   Impl& c = *impl_;
   c.begin_output(picture.y.size());
-  TESSERA_RETURN_IF_ERROR(c.result(c.ready && c.write_picture(picture, scale, nullptr)).status());
-  return c.codes();
+  TESSERA_ASSIGN_OR_RETURN(const auto bytes, c.result(c.ready && c.write_picture(picture, scale, nullptr)));
+  return Fitted{c.codes(), bytes.size()};
 }
 
 StatusOr<std::vector<uint8_t>> JpegCompressor::tables(double scale, const JpegCodes& codes) {

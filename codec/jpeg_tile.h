@@ -23,8 +23,12 @@ class JpegCompressor {
   ~JpegCompressor();
   JpegCompressor(JpegCompressor&&) noexcept;
 
+  struct Fitted {
+    JpegCodes codes;
+    size_t bytes = 0;  // of the picture with codes that need not be able to code any other
+  };
   // Pictures have sides that are multiples of 16. The codes that suit this one best, and can code any other.
-  StatusOr<JpegCodes> codes_for(const YuvImage& picture, double scale);
+  StatusOr<Fitted> codes_for(const YuvImage& picture, double scale);
   // What tiles have in common, in the standard's abbreviated format for table specifications.
   StatusOr<std::vector<uint8_t>> tables(double scale, const JpegCodes& codes);
   // The picture without them (abbreviated format for compressed data).

@@ -12,6 +12,10 @@ double ScaleSearch::scale_for(double bits_per_mcu) const {
   return std::clamp(scale, kFinestScale, kCoarsestScale);
 }
 
+double ScaleSearch::bits_per_mcu(double scale) const {
+  return bits_per_mcu_ * std::pow(scale_ / scale, exponent_);
+}
+
 void ScaleSearch::learn(double scale, double bits_per_mcu, bool same_picture) {
   // Points too close to each other, or of different pictures, say nothing about the slope.
   const double run = std::log(scale / scale_), rise = std::log(bits_per_mcu_ / bits_per_mcu);

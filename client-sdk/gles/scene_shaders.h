@@ -185,7 +185,7 @@ void main() {
   // Coverage travels as grey, 0.5 = the material's cut-off. Its luma is free of chroma's rounding.
   float coverage = dot(atlas_at(at.coverage), vec3(0.2126, 0.7152, 0.0722));
   // The edge one pixel wide, whatever the texels' size.
-  float alpha = clamp((coverage - 0.5) / max(fwidth(coverage), 1e-3) + 0.5, 0.0, 1.0);
+  float alpha = clamp((coverage - 0.5) / max(fwidth(coverage), 2.5e-4) + 0.5, 0.0, 1.0);
   if (single_color.a > 0.5 || form == kFormHalves) alpha = 1.0;
   if (alpha < (multisampled ? 1e-3 : 0.5)) discard;
   color.a = alpha;

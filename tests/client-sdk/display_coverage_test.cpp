@@ -9,15 +9,15 @@ namespace {
 using namespace test;
 
 constexpr uint32_t kSide = 64;
-constexpr Rgb kGreen{0, 200, 0}, kRed{200, 0, 0}, kWhite{255, 255, 255}, kBlack{0, 0, 0};
+constexpr Rgb kGreen{0, 200, 0}, kRed{200, 0, 0}, kCovered{159, 159, 159}, kUncovered{96, 96, 96};
 
 // Colour green, covered where the first half of the colour part's x is; everything around would show as red.
 Image8 half_covered_atlas(uint32_t width, uint32_t height, uint32_t coverage_x, uint32_t coverage_y) {
   Image8 atlas(kAtlasSide, kAtlasSide);
   fill(atlas, 0, 0, kAtlasSide, kAtlasSide, kRed);
   fill(atlas, 4, 4, width, height, kGreen);
-  fill(atlas, 4 + coverage_x, 4 + coverage_y, width, height, kBlack);
-  fill(atlas, 4 + coverage_x, 4 + coverage_y, width / 2, height, kWhite);
+  fill(atlas, 4 + coverage_x, 4 + coverage_y, width, height, kUncovered);
+  fill(atlas, 4 + coverage_x, 4 + coverage_y, width / 2, height, kCovered);
   return atlas;
 }
 

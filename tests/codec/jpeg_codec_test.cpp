@@ -144,11 +144,11 @@ TEST(JpegCodec, BudgetsAreKeptWhereTheAtlasIsFlatInPart) {
 // The longest codes for the most coefficients: no picture is too large for the compressor.
 TEST(JpegCodec, CodesForAFlatPictureCodeNoise) {
   JpegCompressor compressor;
-  const auto codes = compressor.codes_for(grey(256, 256, 128), kFinestScale);
-  ASSERT_TRUE(codes.ok()) << codes.status();
+  const auto fitted = compressor.codes_for(grey(256, 256, 128), kFinestScale);
+  ASSERT_TRUE(fitted.ok()) << fitted.status();
   const YuvImage noise = noise_picture(256, 256, 1);
-  const auto tables = compressor.tables(kFinestScale, *codes);
-  const auto tile = compressor.compress(noise, kFinestScale, *codes);
+  const auto tables = compressor.tables(kFinestScale, fitted->codes);
+  const auto tile = compressor.compress(noise, kFinestScale, fitted->codes);
   ASSERT_TRUE(tables.ok() && tile.ok()) << tile.status();
   EXPECT_GT(tile->size(), 3 * noise.y.size()) << "else this tests nothing";
   YuvImage decoded;
@@ -242,9 +242,10 @@ TEST(JpegCodec, PartlyUsedBlocksAreAsGoodAsWholeOnes) {
     YuvImage tile, back = grey(kSide, kSide, 0);
     gather({view_of(picture), &told}, mcus, tile);
     JpegCompressor compressor;
-    const auto codes = compressor.codes_for(tile, 1);
-    EXPECT_TRUE(codes.ok());
-    const auto tables = compressor.tables(1, *codes), bytes = compressor.compress(tile, 1, *codes);
+    const auto fitted = compressor.codes_for(tile, 1);
+    EXPECT_TRUE(fitted.ok());
+    const auto tables = compressor.tables(1, fitted->codes),
+               bytes = compressor.compress(tile, 1, fitted->codes);
     EXPECT_TRUE(tables.ok() && bytes.ok());
     EXPECT_TRUE(JpegDecompressor().decompress(*tables, *bytes, tile).ok());
     scatter(tile, mcus, back);
