@@ -122,7 +122,7 @@ void see_point(Triangle t, inout TrianglePoint at) {
 
 // Coverage as it travels in the atlas: 0.5 at the cut-off, full swing a quarter of alpha to either side; soft enough that
 // bilinear filtering places the edge between texels. The swing is a quarter of what grey could have: the client asks only
-// where coverage passes the cut-off, and with black and white, masks took 40 % of the bits of an atlas with foliage.
+// where coverage passes the cut-off, and in black and white an atlas with foliage takes a quarter more bits (docs/layouts.md).
 float coverage(float alpha, float cutoff) { return 0.5 + 0.5 * clamp(alpha - cutoff, -0.25, 0.25); }
 
 // What a texel shows, before it is spaced.
