@@ -8,6 +8,7 @@ class ScaleSearch {
  public:
   // `bits_per_mcu` > 0; within kFinestScale..kCoarsestScale.
   double scale_for(double bits_per_mcu) const;
+  // The inverse: what is to be expected of a scale.
   double bits_per_mcu(double scale) const;
   // What a picture took with a scale; the next guess passes through here. `same_picture`: as the one before.
   void learn(double scale, double bits_per_mcu, bool same_picture);
