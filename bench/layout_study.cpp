@@ -7,6 +7,7 @@
 
 #include "CLI/CLI.hpp"
 #include "bench/image_io.h"
+#include "bench/rate_client.h"
 #include "bench/shading_streamer.h"
 #include "bench/study_scene.h"
 #include "bench/texel_picture.h"
@@ -28,10 +29,6 @@ atlas::LayoutSettings layout_settings(const std::string& name, const Size& size)
   return settings;
 }
 
-bool same_atlas(const LayoutRow& a, const LayoutRow& b) {
-  return a.layout == b.layout && a.width == b.width && a.height == b.height;
-}
-
 // Everything of one run.
 class Study {
  public:
@@ -42,21 +39,29 @@ class Study {
   struct Case {
     std::string layout;
     Size atlas;
-    std::optional<double> bitrate_mbps;
   };
-  // Of one case.
+  // Of one case: what its rows have in common, and for each bit rate what they have not.
   struct Series {
-    ErrorMean error, coded;
+    LayoutRow row;
+    ErrorMean error;
     std::vector<double> layout_ms, shading_ms, draw_ms;
+    struct Rate {
+      RateClient client;
+      ErrorMean error;
+      double atlas_kbit = 0;
+    };
+    std::vector<Rate> rates;
   };
 
   Status set_up();
   std::vector<Case> cases() const;
   Status measure(const Case& c);
   Status measure_texel_shading();
-  Status serve(ShadingStreamer& streamer, uint32_t index, const Case& c);
-  Status look(ShadingStreamer& streamer, uint32_t index, const Case& c, LayoutRow& row, Series& series);
-  void add_costs(const server::FrameStats& stats, LayoutRow& row, Series& series) const;
+  Status serve(ShadingStreamer& streamer, uint32_t index, const Case& c, Series& series);
+  Status code(const ShadingStreamer& streamer, uint32_t index, double meta_bits, Series& series) const;
+  Status look(ShadingStreamer& streamer, uint32_t index, const Case& c, Series& series);
+  void add_costs(const server::FrameStats& stats, Series& series) const;
+  void add_rows(Series& series);
 
   uint32_t frame_count() const {
     const double frames = settings_.common.seconds * settings_.common.server_fps;
@@ -99,18 +104,15 @@ Status Study::set_up() {
 std::vector<Study::Case> Study::cases() const {
   std::vector<Case> out;
   if (std::ranges::find(settings_.layouts, kTexelShading) != settings_.layouts.end())
-    out.push_back({kTexelShading, {}, std::nullopt});
+    out.push_back({kTexelShading, {}});
   for (const Size& atlas : settings_.atlases) {
-    for (const std::string& layout : settings_.layouts) {
-      if (layout == kTexelShading) continue;  // it has no atlas
-      if (settings_.bitrates_mbps.empty()) out.push_back({layout, atlas, std::nullopt});
-      for (const double mbps : settings_.bitrates_mbps) out.push_back({layout, atlas, mbps});
-    }
+    for (const std::string& layout : settings_.layouts)
+      if (layout != kTexelShading) out.push_back({layout, atlas});  // it has no atlas
   }
   return out;
 }
 
-Status Study::serve(ShadingStreamer& streamer, uint32_t index, const Case& c) {
+Status Study::serve(ShadingStreamer& streamer, uint32_t index, const Case& c, Series& series) {
   const LoopbackSettings& s = settings_.common;
   // What has arrived of the client's poses.
   std::vector<TimedPose> poses;
@@ -124,20 +126,29 @@ Status Study::serve(ShadingStreamer& streamer, uint32_t index, const Case& c) {
                              .round_trip_ns = shown_at(index) - newest,
                              .scene_time_ns = served_at(index)};
   TESSERA_ASSIGN_OR_RETURN(const std::vector<Packet> packets, streamer.serve(request));
-  for (const Packet& packet : packets)
+  double meta_bits = 0;
+  for (const Packet& packet : packets) {
     TESSERA_RETURN_IF_ERROR(streamer.deliver(packet.channel, packet.bytes));
+    if (packet.channel == Channel::meta) meta_bits += 8.0 * static_cast<double>(packet.bytes.size());
+  }
   if (streamer.newest_frame() != index)
     return absl::InternalError(
         absl::StrCat("layout ", c.layout, ": frame ", index, " did not come out whole"));
-  if (index < kWarmUpFrames) return absl::OkStatus();
-  LayoutRow& row = result_.rows.back();
-  for (const Packet& packet : packets)
-    (packet.channel == Channel::meta ? row.meta_kbit : row.atlas_kbit) +=
-        0.008 * static_cast<double>(packet.bytes.size());
+  if (index >= kWarmUpFrames) series.row.meta_kbit += 0.001 * meta_bits;
+  return code(streamer, index, meta_bits, series);
+}
+
+Status Study::code(const ShadingStreamer& streamer, uint32_t index, double meta_bits, Series& series) const {
+  for (Series::Rate& rate : series.rates) {
+    TESSERA_ASSIGN_OR_RETURN(const double bits,
+                             rate.client.serve(index, streamer.session().yuv(), meta_bits));
+    if (index >= kWarmUpFrames) rate.atlas_kbit += 0.001 * bits;
+  }
   return absl::OkStatus();
 }
 
-void Study::add_costs(const server::FrameStats& stats, LayoutRow& row, Series& series) const {
+void Study::add_costs(const server::FrameStats& stats, Series& series) const {
+  LayoutRow& row = series.row;
   const double texels = static_cast<double>(row.width) * row.height;
   const auto samples = static_cast<double>(stats.gather.samples);
   row.samples += samples;
@@ -152,65 +163,72 @@ void Study::add_costs(const server::FrameStats& stats, LayoutRow& row, Series& s
   series.shading_ms.push_back(stats.times.shading_ms);
 }
 
-Status Study::look(ShadingStreamer& streamer, uint32_t index, const Case& c, LayoutRow& row, Series& series) {
+Status Study::look(ShadingStreamer& streamer, uint32_t index, const Case& c, Series& series) {
   View view = client_view(settings_.common);
   view.pose = pose_at(shown_at(index));
   TESSERA_ASSIGN_OR_RETURN(const RenderedImage truth, truth_->truth(view, shown_at(index)));
-  const bool first_rate = !c.bitrate_mbps || *c.bitrate_mbps == settings_.bitrates_mbps.front();
-  if (first_rate) {
-    TESSERA_ASSIGN_OR_RETURN(Image8 shown, streamer.draw_uncoded(view));
-    const Comparison compared = compare_images(truth->color, shown);
-    series.error.add(compared.error);
-    const bool pictured = index == kWarmUpFrames && c.atlas == settings_.atlases.back();
-    if (pictured) {
-      result_.pictures.push_back({absl::StrFormat("%s, %dx%d", c.layout, c.atlas.width, c.atlas.height),
-                                  compared.error.mssim, truth->color, std::move(shown),
-                                  dssim_picture(compared.ssim), streamer.uncoded_atlas()});
-    }
-  }
-  if (c.bitrate_mbps) {
-    TESSERA_ASSIGN_OR_RETURN(const Image8 shown, streamer.draw(view));
-    series.coded.add(compare_luma(truth->color, shown));
-  }
+  TESSERA_ASSIGN_OR_RETURN(Image8 shown, streamer.draw_uncoded(view));
   const SteadyClock clock;
   const TimeNs begin = clock.now();
   TESSERA_RETURN_IF_ERROR(streamer.display().draw(view).status());
   series.draw_ms.push_back(to_ms(clock.now() - begin));
-  row.holes += hole_share(truth->triangle_plus_one, truth->covered,
-                          [&](uint32_t triangle) { return streamer.has_patch((*patch_of_)[triangle]); });
+  const Comparison compared = compare_images(truth->color, shown);
+  series.error.add(compared.error);
+  series.row.holes += hole_share(truth->triangle_plus_one, truth->covered, [&](uint32_t triangle) {
+    return streamer.has_patch((*patch_of_)[triangle]);
+  });
+  if (index == kWarmUpFrames && c.atlas == settings_.atlases.back()) {
+    result_.pictures.push_back({absl::StrFormat("%s, %dx%d", c.layout, c.atlas.width, c.atlas.height),
+                                compared.error.mssim, truth->color, std::move(shown),
+                                dssim_picture(compared.ssim), streamer.uncoded_atlas()});
+  }
+  for (Series::Rate& rate : series.rates) {
+    TESSERA_ASSIGN_OR_RETURN(const Image8 coded, streamer.draw_atlas(rate.client.atlas(), view));
+    rate.error.add(compare_luma(truth->color, coded));
+  }
   return absl::OkStatus();
+}
+
+// One for each bit rate, or one alone where nothing is coded.
+void Study::add_rows(Series& series) {
+  LayoutRow& row = series.row;
+  const double counted = frame_count() - kWarmUpFrames;
+  for (double* sum : {&row.samples, &row.outside_share, &row.fill, &row.bias, &row.blocks, &row.colors,
+                      &row.out_of_memory, &row.changed, &row.meta_kbit})
+    *sum /= counted;
+  row.holes /= result_.frames;
+  row.error = series.error.mean();
+  row.layout_ms = percentiles(series.layout_ms);
+  row.shading_ms = percentiles(series.shading_ms);
+  row.draw_ms = percentiles(series.draw_ms);
+  if (series.rates.empty()) result_.rows.push_back(row);
+  for (size_t i = 0; i < series.rates.size(); ++i) {
+    row.bitrate_mbps = settings_.bitrates_mbps[i];
+    row.atlas_kbit = series.rates[i].atlas_kbit / counted;
+    row.coded = series.rates[i].error.mean();
+    result_.rows.push_back(row);
+  }
 }
 
 Status Study::measure(const Case& c) {
   LoopbackSettings common = settings_.common;
   common.atlas = c.atlas;
-  common.codec = c.bitrate_mbps ? AtlasCodec::h264 : AtlasCodec::raw;
-  if (c.bitrate_mbps) common.bitrate_mbps = *c.bitrate_mbps;
+  common.codec = AtlasCodec::raw;  // bit rates have coders of their own
   server::SessionSettings session = session_settings(common);
   session.layout = layout_settings(c.layout, c.atlas);
   TESSERA_ASSIGN_OR_RETURN(const auto streamer, ShadingStreamer::create(on_->shared, common, session));
-  LayoutRow& row = result_.rows.emplace_back(LayoutRow{
-      .layout = c.layout, .width = c.atlas.width, .height = c.atlas.height, .bitrate_mbps = c.bitrate_mbps});
-  Series series;
+  Series series{.row = {.layout = c.layout, .width = c.atlas.width, .height = c.atlas.height}};
+  for (const double mbps : settings_.bitrates_mbps) {
+    TESSERA_ASSIGN_OR_RETURN(RateClient client, RateClient::create(common, mbps));
+    series.rates.push_back({std::move(client)});
+  }
   for (uint32_t i = 0; i < frame_count(); ++i) {
-    TESSERA_RETURN_IF_ERROR(serve(*streamer, i, c));
-    if (i >= kWarmUpFrames) add_costs(streamer->last_stats(), row, series);
-    if (is_scored(i)) TESSERA_RETURN_IF_ERROR(look(*streamer, i, c, row, series));
+    TESSERA_RETURN_IF_ERROR(serve(*streamer, i, c, series));
+    if (i >= kWarmUpFrames) add_costs(streamer->last_stats(), series);
+    if (is_scored(i)) TESSERA_RETURN_IF_ERROR(look(*streamer, i, c, series));
     progress_.advance();
   }
-  const double counted = frame_count() - kWarmUpFrames;
-  for (double* sum : {&row.samples, &row.outside_share, &row.fill, &row.bias, &row.blocks, &row.colors,
-                      &row.out_of_memory, &row.changed, &row.atlas_kbit, &row.meta_kbit})
-    *sum /= counted;
-  row.holes /= result_.frames;
-  // Coding does not change it: it was measured with the first bit rate.
-  const auto first =
-      std::ranges::find_if(result_.rows, [&](const LayoutRow& r) { return same_atlas(r, row); });
-  row.error = series.error.count() ? series.error.mean() : first->error;
-  if (c.bitrate_mbps) row.coded = series.coded.mean();
-  row.layout_ms = percentiles(series.layout_ms);
-  row.shading_ms = percentiles(series.shading_ms);
-  row.draw_ms = percentiles(series.draw_ms);
+  add_rows(series);
   return absl::OkStatus();
 }
 

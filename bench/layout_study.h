@@ -69,7 +69,8 @@ struct LayoutStudyResult {
   std::vector<LayoutPicture>
       pictures;  // of the first scored frame in the last atlas size; not part of the JSON
 };
-constexpr uint32_t kWarmUpFrames = 12;
+// A second at the usual rate: a stream's first pictures are coarse.
+constexpr uint32_t kWarmUpFrames = 30;
 
 nlohmann::json to_json(const LayoutStudyResult& result);
 std::string to_text(const LayoutStudyResult& result);

@@ -128,9 +128,9 @@ struct ShadingStreamer::Impl {
     TESSERA_RETURN_IF_ERROR(display->set_atlas(atlas));
     return display->draw(view);
   }
-  StatusOr<Image8> draw(const YuvImage& atlas, const View& view) {
+  StatusOr<Image8> draw(const YuvView& atlas, const View& view) {
     TESSERA_RETURN_IF_ERROR(display->set_state(pair->state));
-    TESSERA_RETURN_IF_ERROR(display->set_atlas(codec::view_of(atlas)));
+    TESSERA_RETURN_IF_ERROR(display->set_atlas(atlas));
     return display->draw(view);
   }
 };
@@ -202,11 +202,12 @@ std::optional<FrameNumber> ShadingStreamer::newest_frame() {
 }
 
 StatusOr<Image8> ShadingStreamer::draw(const View& view) {
-  return impl_->draw(impl_->pair->atlas, view);
+  return draw_atlas(codec::view_of(impl_->pair->atlas), view);
 }
 
 StatusOr<Image8> ShadingStreamer::draw_uncoded_420(const View& view) {
-  return impl_->draw(codec::rgb_to_yuv(impl_->current().rgb), view);
+  const YuvImage atlas = codec::rgb_to_yuv(impl_->current().rgb);
+  return draw_atlas(codec::view_of(atlas), view);
 }
 
 StatusOr<Image8> ShadingStreamer::draw_uncoded(const View& view) {
@@ -234,6 +235,10 @@ Status ShadingStreamer::meter_coverage(CoverageMeter& meter, std::function<Pose(
   return absl::OkStatus();
 }
 
+StatusOr<Image8> ShadingStreamer::draw_atlas(const YuvView& atlas, const View& view) {
+  return impl_->draw(atlas, view);
+}
+
 bool ShadingStreamer::has_patch(scene::PatchId patch) const {
   const auto& placements = impl_->current().placements;
   const auto at = std::lower_bound(placements.begin(), placements.end(), patch,
@@ -256,7 +261,7 @@ const Image8& ShadingStreamer::uncoded_atlas() const {
 client::Display& ShadingStreamer::display() {
   return *impl_->display;
 }
-server::Session& ShadingStreamer::session() {
+server::Session& ShadingStreamer::session() const {
   return *impl_->session;
 }
 

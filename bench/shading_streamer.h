@@ -45,6 +45,8 @@ class ShadingStreamer final : public Streamer {
   // nor staleness: the placed samples are shaded again as seen from this view. `instant` is the scene at the
   // view's time.
   StatusOr<Image8> draw_fresh(const View& view, const scene::SceneInstant& instant);
+  // Of the current frame's geometry with another atlas, such as one coded otherwise.
+  StatusOr<Image8> draw_atlas(const YuvView& atlas, const View& view);
   // Whether the current frame has samples for this patch.
   bool has_patch(scene::PatchId patch) const;
 
@@ -54,7 +56,7 @@ class ShadingStreamer final : public Streamer {
   const server::FrameStats& last_stats() const;  // of the last served frame
   const Image8& uncoded_atlas() const;           // of the current frame; empty without the split
   client::Display& display();                    // as the last picture left it
-  server::Session& session();
+  server::Session& session() const;
 
  private:
   struct Impl;

@@ -12,8 +12,12 @@ namespace {
 constexpr uint32_t kMaxSide = 8192;    // texels
 constexpr uint64_t kStages = 16;       // of re-placing the atlas: a frame moves at most this part of it
 constexpr float kFullest = 0.75f;      // slabs with a larger share in use are not worth emptying
+constexpr int64_t kGrowthStages = 32;  // as kStages, for growth
+constexpr int kGrowthTries = 16;       // that find no room, a frame
+constexpr float kUrgent = 3;           // growth by so much deserves that others move
+constexpr float kAhead = 0.6f;         // of bias: who grows is likely to come closer still
 constexpr int kFirstTries = 16;        // to find a place for all in the first frame
-constexpr int kPauseFrames = 15;       // after a stage that served no need, after a rectangle could not grow
+constexpr int kPauseFrames = 15;       // after a stage that served no need
 constexpr int kMostPauseFrames = 240;  // doubled for each stage in a row that helped nobody
 constexpr int kHalvings = 3;           // of a rectangle's area, where there is no room for all of it
 
@@ -36,7 +40,7 @@ void set_size(Placement& p, const RectangleSize& size) {
   p.kind = PlacementKind::block;
   p.width = static_cast<uint16_t>(sides.x);
   p.height = static_cast<uint16_t>(sides.y);
-  p.transposed = size.u > size.v;  // the short side is the width
+  p.transposed = size.u < size.v;  // the long side is the width
 }
 
 }  // namespace
@@ -50,6 +54,12 @@ struct Layout::Impl {
         target(l.width * double(l.height)),
         most(most_sides(l.width, l.height)) {}
 
+  struct Growth {
+    float by;        // samples: wished over held
+    uint32_t index;  // of `now`
+    Spacing spacing;
+  };
+
   LayoutDelta update(const LayoutInput& input);
   void place(const LayoutInput& input);
   void fit_first_frame(const LayoutInput& input);
@@ -57,8 +67,10 @@ struct Layout::Impl {
   void choose(const LayoutInput& input);
   void choose_one(scene::PatchId patch, const Wanted& wanted, const Placement* was, const Spacing& spacing);
   void allocate();
+  void grow();
+  bool take_larger_place(const Growth& growth);
   bool take_place(Placement& p);
-  bool take_smaller_place(Placement& p, const Wanted& want);
+  bool take_smaller_place(Placement& p);
   void plan_stage();
   void count(const LayoutDelta& delta);
   void plan_next_frame();
@@ -74,8 +86,8 @@ struct Layout::Impl {
   BiasFollower bias;
   LayoutStats stats;
   MostSides most;
-  bool memory_short = false;  // after the last frame
-  int frames_to_growth = 0;   // until then, or while memory is short, rectangles may not grow
+  bool memory_short = false;   // after the last frame
+  uint32_t waiting_width = 0;  // of the widest whose growth is urgent and found no room; 0: none
   int frames_to_next_stage = 0, starved_pause = 1, frames_since_shrink = kPauseFrames;
   size_t starved_before = 0;  // the last stage
 
@@ -84,6 +96,7 @@ struct Layout::Impl {
   // Of this frame; kept to keep their memory.
   std::vector<Wanted> wanted;              // a visible patch
   std::vector<uint32_t> moving, entering;  // indices of `now` that need a rectangle; moving ones had one
+  std::vector<Growth> growing;             // who should be larger; keeps what it has until then
 };
 
 LayoutDelta Layout::Impl::update(const LayoutInput& input) {
@@ -99,6 +112,7 @@ LayoutDelta Layout::Impl::update(const LayoutInput& input) {
 void Layout::Impl::place(const LayoutInput& input) {
   follow_bias(input.visible);
   choose(input);
+  grow();
   allocate();
 }
 
@@ -131,6 +145,7 @@ void Layout::Impl::follow_bias(const scene::VisiblePatches& visible) {
 void Layout::Impl::choose(const LayoutInput& input) {
   std::swap(now, before);
   for (auto* list : {&moving, &entering}) list->clear();
+  growing.clear();
   now.clear();
   auto old = before.begin();
   uint32_t instance = 0;
@@ -148,6 +163,39 @@ void Layout::Impl::choose(const LayoutInput& input) {
     if (known) ++old;
   }
   for (; old != before.end(); ++old) free(*old);
+}
+
+// A part of the atlas a frame, the smallest for their wish first. What finds no room keeps what it has.
+void Layout::Impl::grow() {
+  waiting_width = 0;
+  if (memory_short) return;
+  std::ranges::sort(growing, std::ranges::greater(), &Growth::by);
+  int64_t budget = int64_t{settings.width} * settings.height / kGrowthStages;
+  int tries = kGrowthTries;
+  for (const Growth& g : growing) {
+    if (budget <= 0 || tries <= 0) break;
+    if (take_larger_place(g)) {
+      budget -= static_cast<int64_t>(now[g.index].texels());
+    } else {
+      --tries;
+    }
+  }
+}
+
+bool Layout::Impl::take_larger_place(const Growth& g) {
+  Placement& p = now[g.index];
+  const Wanted& want = wanted[g.index];
+  Placement grown = p;
+  grown.spacing = g.spacing;
+  for (const float ahead : {kAhead, 0.0f}) {
+    set_size(grown, select_size(want.need, want.masked, stats.bias - ahead, nullptr, settings.levels, most));
+    if (!take_place(grown)) continue;
+    free(p);
+    p = grown;
+    return true;
+  }
+  if (g.by >= kUrgent) waiting_width = std::max<uint32_t>(waiting_width, grown.width);
+  return false;
 }
 
 // `was`: or nullptr for a patch that was not visible.
@@ -169,9 +217,10 @@ void Layout::Impl::choose_one(scene::PatchId patch, const Wanted& want, const Pl
     return;
   }
   const uvec2 sides = sides_of(size, want.masked);
-  const bool waits =
-      (memory_short || frames_to_growth > 0) && had_place && !moves && sides.x * sides.y > was->texels();
-  if (had_place && !moves && (size == held || waits)) {
+  const float growth =
+      had_place ? static_cast<float>(sides.x * sides.y) / static_cast<float>(was->texels()) : 0;
+  if (had_place && !moves && (size == held || growth > 1)) {
+    if (growth > 1) growing.push_back({growth, index, spacing});
     p = *was;
     if (!still_good(was->spacing, spacing)) p.spacing = spacing;
     return;
@@ -191,10 +240,13 @@ bool Layout::Impl::take_place(Placement& p) {
 }
 
 // Fewer samples show less than they should, a single colour still less.
-bool Layout::Impl::take_smaller_place(Placement& p, const Wanted& want) {
+bool Layout::Impl::take_smaller_place(Placement& p) {
+  const RectangleSize wished = size_of(p);
+  RectangleNeed need{wished.u - 1.0f, wished.v - 1.0f};
+  need.area = need.u * need.v;
   for (int halvings = 1; halvings <= kHalvings; ++halvings) {
-    const float bias_here = stats.bias + static_cast<float>(halvings);
-    const RectangleSize size = select_size(want.need, want.masked, bias_here, nullptr, settings.levels, most);
+    const auto bias_here = static_cast<float>(halvings);
+    const RectangleSize size = select_size(need, p.masked, bias_here, nullptr, settings.levels, most);
     if (size.single_color()) return false;
     set_size(p, size);
     if (!take_place(p)) continue;
@@ -217,7 +269,7 @@ void Layout::Impl::allocate() {
     std::sort(list->begin(), list->end(), wider);
     for (const uint32_t index : *list) {
       Placement& p = now[index];
-      if (take_place(p) || take_smaller_place(p, wanted[index])) continue;
+      if (take_place(p) || take_smaller_place(p)) continue;
       p = {.patch = p.patch, .masked = p.masked};
       starved.push_back(p.patch);
     }
@@ -243,12 +295,14 @@ void Layout::Impl::count(const LayoutDelta& delta) {
 void Layout::Impl::plan_stage() {
   if (frames_to_next_stage > 0) --frames_to_next_stage;
   if (starved.empty()) starved_pause = 1;
-  if (!memory_short || frames_to_next_stage > 0) return;
+  if (!(memory_short || waiting_width > 0) || frames_to_next_stage > 0) return;
   const bool helps = starved.size() < starved_before;
   starved_before = starved.size();
   starved_pause = helps ? 1 : std::min(2 * starved_pause, kMostPauseFrames);
   frames_to_next_stage = starved.empty() ? kPauseFrames : starved_pause;
-  stats.reset = slabs.close_emptiest(uint64_t{settings.width} * settings.height / kStages, kFullest);
+  const uint64_t most_moved = uint64_t{settings.width} * settings.height / kStages;
+  stats.reset = starved.empty() && waiting_width > 0 ? slabs.close_for(waiting_width, most_moved)
+                                                     : slabs.close_emptiest(most_moved, kFullest);
   if (stats.reset) ++stats.resets_total;
 }
 
@@ -258,8 +312,6 @@ void Layout::Impl::plan_next_frame() {
   memory_short = is_starved || slabs.free_share() < 1 - settings.high_water;
   stats.reset = false;
   plan_stage();
-  if (frames_to_growth > 0) --frames_to_growth;
-  if (is_starved) frames_to_growth = kPauseFrames;
   ++frames_since_shrink;
   if (is_starved && frames_since_shrink >= kPauseFrames) {
     target.on_out_of_memory();

@@ -6,9 +6,11 @@
 namespace tessera::atlas::coherent {
 namespace {
 
-// Widths of slabs: few enough to share slabs, close enough that density is off by an eighth at most.
-constexpr uint16_t kWidths[] = {2,  4,  6,  8,  10, 12, 14,  16,  20,  24,  28,  32,
-                                40, 48, 56, 64, 80, 96, 112, 128, 160, 192, 224, 256};
+// Widths of slabs: few enough to share slabs, close enough that the shape is off by a fifth at most. Their
+// edges lie where those of the squares lie that video transforms as a unit, but for the smallest.
+constexpr uint16_t kWidths[] = {2, 4, 6, 8, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192, 256};
+
+constexpr float kMostExcess = 1.25f;  // of height, for a width that is too small
 
 struct WidthTable {
   // By half the wish, rounded.
@@ -18,7 +20,7 @@ struct WidthTable {
       nearest[i] = kWidths[0];
       for (const uint16_t width : kWidths) {
         const auto distance = [&](uint16_t w) { return w > 2 * i ? w - 2 * i : 2 * i - w; };
-        if (distance(width) < distance(nearest[i])) nearest[i] = width;
+        if (distance(width) <= distance(nearest[i])) nearest[i] = width;
       }
     }
   }
@@ -35,25 +37,38 @@ uint16_t width_within(uint32_t most) {
   return *(std::ranges::upper_bound(kWidths, most) - 1);
 }
 
-// Before the size is held back by that of the last frame.
-RectangleSize wish(const RectangleNeed& need, bool masked, float scale, const MostSides& most) {
-  const uint32_t longest = masked ? most.height / 4 * 2 : most.height;
-  const bool u_is_short = need.u <= need.v;
-  const float short_intervals = scale * (u_is_short ? need.u : need.v);
-  const float long_intervals = scale * (u_is_short ? need.v : need.u);
-  const uint16_t width = std::min(kWidthTable.nearest[even(short_intervals + 1, longest) / 2],
-                                  width_within(std::min<uint32_t>(longest, most.width)));
-  // The length makes up for the width's rounding, so that the area stays. A sliver pays for its two texels of
-  // width with its length: otherwise slivers would hold texels that wide patches make more of.
-  const float excess = std::min(short_intervals / static_cast<float>(width - 1), 1.25f);
-  uint16_t length = even(long_intervals * excess + 1, longest);
-  length = std::max(length, width);
-  return u_is_short ? RectangleSize{width, length} : RectangleSize{length, width};
+uint16_t next_width(uint16_t width) {
+  return *std::ranges::upper_bound(kWidths, width);
 }
 
-bool near(uint16_t wished, uint16_t held, float hysteresis) {
-  const float margin = std::max(2.0f, hysteresis * static_cast<float>(held));
-  return std::abs(static_cast<float>(wished) - static_cast<float>(held)) <= margin;
+// Before the size is held back by that of the last frame.
+RectangleSize wish(const RectangleNeed& need, bool masked, float scale, const MostSides& most) {
+  const uint16_t widest = width_within(masked ? std::max(most.width / 2, 2) : most.width);
+  const uint32_t highest = masked ? std::max(most.height / 4 * 2, 2) : most.height;
+  const bool u_is_long = need.u >= need.v;
+  const float across = scale * (u_is_long ? need.v : need.u);
+  // A sliver gets two texels of height and pays for them with its length: otherwise slivers would hold texels
+  // that others make more of.
+  const float height_intervals = std::max(across, 1.0f);
+  const float length = scale * (u_is_long ? need.u : need.v) * across / height_intervals;
+  // The height makes up for the width's rounding, so that the area stays.
+  const auto height_at = [&](uint16_t width) {
+    return even(height_intervals * std::min(length / static_cast<float>(width - 1), kMostExcess) + 1,
+                highest);
+  };
+  uint16_t width = std::min(kWidthTable.nearest[even(length + 1, kShelfHeight) / 2], widest);
+  if (height_at(width) > width && width < widest) width = next_width(width);
+  const uint16_t height = std::min(height_at(width), width);
+  return u_is_long ? RectangleSize{width, height} : RectangleSize{height, width};
+}
+
+// Neither side may have much fewer samples than wished, which shows; both together not many more, which costs
+// others theirs. Wide bounds: what is placed anew costs bits.
+bool still_fits(const RectangleSize& held, const RectangleSize& wished) {
+  constexpr float kSparsest = 0.7f, kDensest = 2.5f;
+  const auto enough = [](float has, float wish) { return has >= std::min(kSparsest * wish, wish - 2); };
+  return enough(held.u, wished.u) && enough(held.v, wished.v) &&
+         static_cast<float>(held.u * held.v) <= kDensest * static_cast<float>(wished.u * wished.v);
 }
 
 uint64_t texels(const RectangleSize& size, bool masked) {
@@ -81,15 +96,15 @@ RectangleSize select_size(const RectangleNeed& need, bool masked, float bias, co
     color_area *= std::exp2(previous->single_color() ? settings.hysteresis : -settings.hysteresis);
   if (!(need.area * (masked ? 2.0f : 1.0f) >= color_area)) return {};
   const RectangleSize size = wish(need, masked, std::exp2(-0.5f * bias), most);
-  const bool stays = previous && !previous->single_color() &&
-                     near(size.u, previous->u, settings.hysteresis) &&
-                     near(size.v, previous->v, settings.hysteresis);
+  const bool stays = previous && !previous->single_color() && still_fits(*previous, size);
   return stays ? *previous : size;
 }
 
 uvec2 sides_of(const RectangleSize& size, bool masked) {
-  const uint32_t width = std::min(size.u, size.v), length = std::max(size.u, size.v);
-  return {width, masked ? 2 * length : length};
+  const uint32_t width = std::max(size.u, size.v), height = std::min(size.u, size.v);
+  if (!masked) return {width, height};
+  // A block is split across its longer side (atlas/placement.h).
+  return width > 2 * height ? uvec2(2 * width, height) : uvec2(width, 2 * height);
 }
 
 float select_bias(std::span<const Wanted> wanted, double target_texels, const LevelSettings& settings,

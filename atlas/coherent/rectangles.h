@@ -34,7 +34,7 @@ MostSides most_sides(uint32_t atlas_width, uint32_t atlas_height);
 RectangleSize select_size(const RectangleNeed& need, bool masked, float bias, const RectangleSize* previous,
                           const LevelSettings& settings, const MostSides& most = {});
 
-// Sides in the atlas, with coverage: the short one is the width.
+// Sides in the atlas, with coverage: the long one is the width.
 uvec2 sides_of(const RectangleSize& size, bool masked);
 
 // The smallest bias at which all rectangles together have at most `target_texels`; clamped to the settings'

@@ -70,8 +70,8 @@ std::optional<uvec2> Slabs::allocate(uint32_t width, uint32_t height) {
 std::optional<uvec2> Slabs::find(uint32_t width, uint32_t rows) {
   if (const auto at = take_from_width(width, rows)) return at;
   if (const auto slab = draw_slab(width, rows)) return take(*slab, rows);
-  // Better a little too wide than none.
-  for (uint32_t wider = width + 1; wider <= std::min(2 * width - 1, kShelfHeight / kUnit); ++wider) {
+  // Better too wide than none.
+  for (uint32_t wider = width + 1; wider <= std::min(4 * width, kShelfHeight / kUnit); ++wider) {
     if (const auto at = take_from_width(wider, rows)) return at;
   }
   return std::nullopt;
@@ -142,12 +142,40 @@ bool Slabs::close_emptiest(uint64_t budget_texels, float fullest) {
   bool closed = false;
   for (const Candidate& candidate : candidates) {
     Slab& slab = slabs_[candidate.index];
-    const uint64_t texels = uint64_t{slab.used} * slab.width * kUnit * kUnit;
+    const uint64_t texels = texels_in(slab);
     if (texels > budget_texels) continue;
     budget_texels -= texels;
     slab.closed = closed = true;
   }
   return closed;
+}
+
+std::vector<uint32_t> Slabs::slabs_within(const Shelf& shelf, uint32_t x, uint32_t width) const {
+  std::vector<uint32_t> within;
+  for (uint32_t at = x; at < x + width;) {
+    if (shelf.taken[at]) within.push_back(shelf.slab_of_x[at]);
+    at += shelf.taken[at] ? slabs_[within.back()].width : 1;
+  }
+  return within;
+}
+
+bool Slabs::close_for(uint32_t width, uint64_t budget_texels) {
+  const uint32_t units = width / kUnit;
+  std::vector<uint32_t> cheapest;
+  uint64_t least = budget_texels + 1;
+  for (const Shelf& shelf : shelves_) {
+    for (uint32_t x = 0; x + units <= shelf.taken.size();) {
+      std::vector<uint32_t> within = slabs_within(shelf, x, units);
+      uint64_t texels = 0;
+      for (const uint32_t index : within) texels += texels_in(slabs_[index]);
+      x += shelf.taken[x] ? slabs_[shelf.slab_of_x[x]].width : 1;
+      if (texels >= least) continue;
+      least = texels;
+      cheapest = std::move(within);
+    }
+  }
+  for (const uint32_t index : cheapest) slabs_[index].closed = true;
+  return !cheapest.empty();
 }
 
 void Slabs::reopen() {

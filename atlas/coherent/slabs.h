@@ -42,6 +42,9 @@ class Slabs {
   // these are freed and placed elsewhere, the slabs return to the shelves. Slabs above `fullest` (share in
   // use) stay open. Returns whether any was closed.
   bool close_emptiest(uint64_t budget_texels, float fullest);
+  // Closes the slabs that stand where a new one of this width is the cheapest to clear, if these hold at most
+  // `budget_texels`. Returns whether any was closed: none if there is room already.
+  bool close_for(uint32_t width, uint64_t budget_texels);
   bool closed(uvec2 at) const { return slab_at(at).closed; }
   void reopen();
 
@@ -68,6 +71,9 @@ class Slabs {
 
   const Slab& slab_at(uvec2 at) const { return slabs_[index_at(at)]; }
   uint32_t index_at(uvec2 at) const { return shelves_[at.y / kShelfHeight].slab_of_x[at.x / kUnit]; }
+  uint64_t texels_in(const Slab& slab) const { return uint64_t{slab.used} * slab.width * kUnit * kUnit; }
+  // The slabs of a shelf that stand in `width` units from `x` on, where a slab or a free unit begins.
+  std::vector<uint32_t> slabs_within(const Shelf& shelf, uint32_t x, uint32_t width) const;
   std::optional<uvec2> find(uint32_t width, uint32_t rows);
   std::optional<uvec2> take(uint32_t slab, uint32_t rows);
   std::optional<uvec2> take_from_width(uint32_t width, uint32_t rows);

@@ -194,6 +194,28 @@ TEST_F(CoherentLayout, SpacingIsFrozenWhileItIsGood) {
   EXPECT_TRUE(after.x == before.x && after.y == before.y && after.width == before.width);
 }
 
+// A viewer who walks makes everything ahead grow: a part of it a frame, and a little beyond what it needs,
+// for it will need more.
+TEST_F(CoherentLayout, GrowthIsSpreadOverFramesAndAhead) {
+  LayoutSettings settings{.width = 1024, .height = 1024};
+  settings.levels.min_bias = settings.levels.max_bias = 0;
+  make(300, settings);
+  update(rectangles(300, 23, 23));
+  const VisiblePatches closer = rectangles(300, 39, 39);
+  size_t grown = 0;
+  for (int frame = 0; frame < 40 && grown < 300; ++frame) {
+    uint64_t texels = 0;
+    for (const Placement& p : update(closer).changed) {
+      texels += p.texels();
+      grown += 1;
+      EXPECT_GE(p.texels(), 39u * 39u) << p.patch;
+    }
+    EXPECT_LE(texels, 1024u * 1024 / 32 + 64 * 64) << frame;
+  }
+  EXPECT_EQ(grown, 300u) << "each once";
+  EXPECT_TRUE(update(rectangles(300, 47, 47)).changed.empty()) << "ahead";
+}
+
 // Of few large rectangles a slab holds one, and what is left of it serves none of the others.
 TEST_F(CoherentLayout, TheFirstFrameFindsAPlaceForAll) {
   for (const float side : {90.0f, 140.0f, 190.0f}) {
@@ -222,10 +244,36 @@ TEST(Rectangles, SamplesAreEquallyDenseWhateverTheShape) {
       // Intervals a pixel, both ways together.
       const float density = float(size.u - 1) * float(size.v - 1) / (u * v);
       EXPECT_NEAR(std::log2(density), 0, 0.45f) << u << "x" << v;
-      EXPECT_EQ(sides_of(size, false).x, std::min(size.u, size.v));
-      EXPECT_EQ(sides_of(size, true).y, 2 * std::max(size.u, size.v));
     }
   }
+}
+
+TEST(Rectangles, ABlockSplitsIntoTheColorAndTheCoverageThatWereChosen) {
+  for (float u = 1; u <= 300; u *= 1.1f) {
+    for (float v = 1; v <= 300; v *= 1.1f) {
+      const RectangleSize size = select_size(rectangle_need({u, v, u * v}, 2), true, 0, nullptr, {});
+      if (size.single_color()) continue;
+      const uvec2 sides = sides_of(size, true);
+      Placement p{.kind = PlacementKind::block, .masked = true};
+      p.width = static_cast<uint16_t>(sides.x);
+      p.height = static_cast<uint16_t>(sides.y);
+      EXPECT_EQ(p.color_width(), std::max(size.u, size.v)) << size.u << "x" << size.v;
+      EXPECT_EQ(p.color_height(), std::min(size.u, size.v)) << size.u << "x" << size.v;
+    }
+  }
+}
+
+// Of a patch that comes closer or turns a little.
+TEST(Rectangles, WhatIsHeldStaysUntilASideIsTooSparseOrTheAreaTooDense) {
+  const auto next = [](float u, float v, const RectangleSize& held) {
+    return select_size(rectangle_need({u, v, u * v}, 2), false, 0, &held, {});
+  };
+  const RectangleSize held = select_size(rectangle_need({63, 39, 63 * 39}, 2), false, 0, nullptr, {});
+  EXPECT_EQ(held, (RectangleSize{64, 40}));
+  for (const auto& [u, v] : {std::pair{85.0f, 52.0f}, {85.0f, 20.0f}, {40.0f, 26.0f}})
+    EXPECT_EQ(next(u, v, held), held) << u << "x" << v;
+  for (const auto& [u, v] : {std::pair{95.0f, 39.0f}, {63.0f, 60.0f}, {36.0f, 24.0f}})
+    EXPECT_NE(next(u, v, held), held) << u << "x" << v;
 }
 
 // A quarter of a pixel high, they once held ten times the texels of what they show.
@@ -237,8 +285,8 @@ TEST(Rectangles, SliversPayForTheirWidthWithTheirLength) {
         const RectangleNeed need = rectangle_need(sliver, 2);
         const RectangleSize size = select_size(need, false, 0, nullptr, {});
         if (size.single_color()) continue;
-        // Of the need's intervals; the least width has two texels for one interval.
-        EXPECT_LE(size.u * size.v, 2 * (need.area + 2)) << length << "x" << height;
+        // Two rows for one interval, and a width that is off by a fifth.
+        EXPECT_LE(size.u * size.v, 2.4f * (need.area + 2)) << length << "x" << height;
       }
     }
   }
@@ -277,8 +325,8 @@ TEST(Rectangles, AnyFootprintGivesAValidSize) {
           const RectangleSize size = select_size(rectangle_need({u, v, area}, 2), masked, 0, nullptr, {});
           if (size.single_color()) continue;
           const uvec2 sides = sides_of(size, masked);
-          EXPECT_TRUE(sides.x >= 2 && sides.y <= 256 && sides.x <= sides.y && sides.x % 2 == 0 &&
-                      sides.y % 2 == 0);
+          EXPECT_TRUE(std::min(sides.x, sides.y) >= 2 && std::max(sides.x, sides.y) <= 256 &&
+                      sides.x % 2 == 0 && sides.y % 2 == 0);
         }
 }
 

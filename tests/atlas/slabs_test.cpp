@@ -90,6 +90,25 @@ TEST(Slabs, WhatABudgetIsTooSmallForStopsNoOther) {
   EXPECT_FALSE(slabs.closed(wide));
 }
 
+TEST(Slabs, RoomIsMadeWhereItIsCheapest) {
+  Slabs slabs(256, 256);
+  // Eight slabs; the fourth and the fifth hold least, but for the last, which stands alone.
+  std::vector<uvec2> at, rest;
+  const uint32_t heights[] = {200, 160, 180, 60, 80, 220, 240, 20};
+  for (const uint32_t height : heights) {
+    at.push_back(*slabs.allocate(32, height));
+    rest.push_back(*slabs.allocate(32, 256 - height));
+  }
+  for (size_t i = 0; i < rest.size(); ++i) slabs.free(rest[i], 32, 256 - heights[i]);
+  EXPECT_FALSE(slabs.close_for(64, 32 * (60 + 80) - 1)) << "more than may move";
+  ASSERT_TRUE(slabs.close_for(64, 32 * (60 + 80)));
+  for (size_t i = 0; i < at.size(); ++i) EXPECT_EQ(slabs.closed(at[i]), i == 3 || i == 4) << i;
+  slabs.free(at[3], 32, 60);
+  slabs.free(at[4], 32, 80);
+  EXPECT_FALSE(slabs.close_for(64, 1 << 20)) << "there is room";
+  EXPECT_EQ(slabs.allocate(64, 256), uvec2(96, 0));
+}
+
 TEST(Slabs, ClosedSlabsAreTheEmptiestAndTakeNothing) {
   Slabs slabs(64, 256);
   const uvec2 full = *slabs.allocate(16, 256), half = *slabs.allocate(32, 128),
