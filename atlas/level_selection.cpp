@@ -172,16 +172,28 @@ LevelWish select_level(const BlockNeed& need, bool masked, float bias, const Lev
   return wish_of(shape, masked, max_log);
 }
 
-float least_bias(const LevelSettings& settings, const std::function<bool(float)>& fits) {
+float least_bias(const LevelSettings& settings, const std::function<bool(float)>& fits, float near) {
   constexpr float kStep = 1.0f / 64;
-  if (fits(settings.min_bias)) return settings.min_bias;
-  int too_small = 0;
+  const auto bias_at = [&](int i) {
+    return std::min(settings.max_bias, settings.min_bias + kStep * static_cast<float>(i));
+  };
+  int too_small = -1;
   int enough = static_cast<int>(std::ceil((settings.max_bias - settings.min_bias) / kStep));
+  int at = static_cast<int>(std::clamp((near - settings.min_bias) / kStep, 0.0f, static_cast<float>(enough)));
+  const bool down = fits(bias_at(at));
+  (down ? enough : too_small) = at;
+  // Steps away from the guess, each twice as long as the last, until the result lies between two of them.
+  for (int step = 1; enough - too_small > 1; step *= 2) {
+    at = std::clamp(at + (down ? -step : step), too_small + 1, enough - 1);
+    const bool fit = fits(bias_at(at));
+    (fit ? enough : too_small) = at;
+    if (fit != down) break;
+  }
   while (enough - too_small > 1) {
     const int middle = (too_small + enough) / 2;
-    (fits(settings.min_bias + kStep * static_cast<float>(middle)) ? enough : too_small) = middle;
+    (fits(bias_at(middle)) ? enough : too_small) = middle;
   }
-  return std::min(settings.max_bias, settings.min_bias + kStep * static_cast<float>(enough));
+  return bias_at(enough);
 }
 
 float select_bias(std::span<const float> ideal_areas, double target_texels, const LevelSettings& settings) {

@@ -55,8 +55,8 @@ LevelWish select_level(const BlockNeed& need, bool masked, float bias, const Lev
 
 // The smallest bias in the settings' range at which `fits`, or the largest if it does at none. What is in use
 // falls in steps as the bias grows, so that the search is on a fixed grid: the result is monotonic in what
-// must fit.
-float least_bias(const LevelSettings& settings, const std::function<bool(float)>& fits);
+// must fit. `near`: where to look first, such as the result of the last frame.
+float least_bias(const LevelSettings& settings, const std::function<bool(float)>& fits, float near = 0);
 
 // Global bias b for `target_texels`: the smallest that fits them. Eq. 3.3, b = log2((I - d) / (S - d)), is
 // its value where blocks are not clamped at either end, rounded, or replaced by a colour; here all of that

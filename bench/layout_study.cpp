@@ -58,17 +58,18 @@ class Study {
   Status measure(const Case& c);
   Status measure_texel_shading();
   Status serve(ShadingStreamer& streamer, uint32_t index, const Case& c, Series& series);
-  Status code(const ShadingStreamer& streamer, uint32_t index, double meta_bits, Series& series) const;
+  Status code(const YuvView& atlas, uint32_t index, double meta_bits, Series& series) const;
   Status look(ShadingStreamer& streamer, uint32_t index, const Case& c, Series& series);
   void add_costs(const server::FrameStats& stats, Series& series) const;
   void add_rows(Series& series);
 
   uint32_t frame_count() const {
     const double frames = settings_.common.seconds * settings_.common.server_fps;
-    return kWarmUpFrames + static_cast<uint32_t>(std::max(1L, std::lround(frames)));
+    return settings_.warm_up_frames + static_cast<uint32_t>(std::max(1L, std::lround(frames)));
   }
   bool is_scored(uint32_t index) const {
-    return index >= kWarmUpFrames && (index - kWarmUpFrames) % settings_.common.score_every == 0;
+    return index >= settings_.warm_up_frames &&
+           (index - settings_.warm_up_frames) % settings_.common.score_every == 0;
   }
   // Clock of the run; the scene's, too.
   TimeNs served_at(uint32_t index) const { return from_seconds(index / settings_.common.server_fps); }
@@ -134,15 +135,14 @@ Status Study::serve(ShadingStreamer& streamer, uint32_t index, const Case& c, Se
   if (streamer.newest_frame() != index)
     return absl::InternalError(
         absl::StrCat("layout ", c.layout, ": frame ", index, " did not come out whole"));
-  if (index >= kWarmUpFrames) series.row.meta_kbit += 0.001 * meta_bits;
-  return code(streamer, index, meta_bits, series);
+  if (index >= settings_.warm_up_frames) series.row.meta_kbit += 0.001 * meta_bits;
+  return code(streamer.session().yuv(), index, meta_bits, series);
 }
 
-Status Study::code(const ShadingStreamer& streamer, uint32_t index, double meta_bits, Series& series) const {
+Status Study::code(const YuvView& atlas, uint32_t index, double meta_bits, Series& series) const {
   for (Series::Rate& rate : series.rates) {
-    TESSERA_ASSIGN_OR_RETURN(const double bits,
-                             rate.client.serve(index, streamer.session().yuv(), meta_bits));
-    if (index >= kWarmUpFrames) rate.atlas_kbit += 0.001 * bits;
+    TESSERA_ASSIGN_OR_RETURN(const double bits, rate.client.serve(index, atlas, meta_bits));
+    if (index >= settings_.warm_up_frames) rate.atlas_kbit += 0.001 * bits;
   }
   return absl::OkStatus();
 }
@@ -177,7 +177,7 @@ Status Study::look(ShadingStreamer& streamer, uint32_t index, const Case& c, Ser
   series.row.holes += hole_share(truth->triangle_plus_one, truth->covered, [&](uint32_t triangle) {
     return streamer.has_patch((*patch_of_)[triangle]);
   });
-  if (index == kWarmUpFrames && c.atlas == settings_.atlases.back()) {
+  if (index == settings_.warm_up_frames && c.atlas == settings_.atlases.back()) {
     result_.pictures.push_back({absl::StrFormat("%s, %dx%d", c.layout, c.atlas.width, c.atlas.height),
                                 compared.error.mssim, truth->color, std::move(shown),
                                 dssim_picture(compared.ssim), streamer.uncoded_atlas()});
@@ -192,7 +192,7 @@ Status Study::look(ShadingStreamer& streamer, uint32_t index, const Case& c, Ser
 // One for each bit rate, or one alone where nothing is coded.
 void Study::add_rows(Series& series) {
   LayoutRow& row = series.row;
-  const double counted = frame_count() - kWarmUpFrames;
+  const double counted = frame_count() - settings_.warm_up_frames;
   for (double* sum : {&row.samples, &row.outside_share, &row.fill, &row.bias, &row.blocks, &row.colors,
                       &row.out_of_memory, &row.changed, &row.meta_kbit})
     *sum /= counted;
@@ -224,7 +224,7 @@ Status Study::measure(const Case& c) {
   }
   for (uint32_t i = 0; i < frame_count(); ++i) {
     TESSERA_RETURN_IF_ERROR(serve(*streamer, i, c, series));
-    if (i >= kWarmUpFrames) add_costs(streamer->last_stats(), series);
+    if (i >= settings_.warm_up_frames) add_costs(streamer->last_stats(), series);
     if (is_scored(i)) TESSERA_RETURN_IF_ERROR(look(*streamer, i, c, series));
     progress_.advance();
   }
@@ -235,7 +235,7 @@ Status Study::measure(const Case& c) {
 // Nothing of it is streamed: its texture is too large. Its pictures are what a client would show that has
 // all of it, shaded a moment ago.
 Status Study::measure_texel_shading() {
-  const TimeNs begin = shown_at(kWarmUpFrames);
+  const TimeNs begin = shown_at(settings_.warm_up_frames);
   View view = client_view(settings_.common);
   view.pose = pose_at(begin);
   // Sets the scene's moment.
@@ -257,7 +257,7 @@ Status Study::measure_texel_shading() {
     const Comparison compared = compare_images(truth->color, shown.image);
     error.add(compared.error);
     row.samples += static_cast<double>(shown.samples) / result_.frames;
-    if (i == kWarmUpFrames)
+    if (i == settings_.warm_up_frames)
       result_.pictures.push_back({kTexelShading,
                                   compared.error.mssim,
                                   truth->color,

@@ -20,12 +20,13 @@ struct LayoutStudySettings {
   std::vector<Size> atlases{{1024, 1024}, {2048, 1024}, {2048, 2048}};
   std::vector<double> bitrates_mbps;  // H.264, atlas and meta together; none: nothing is coded
   double speed = 1;                   // of the path
+  uint32_t warm_up_frames = 30;       // not counted: a stream's first pictures are coarse
   uint32_t texture_mtexels = 1024;    // level 0 of texel shading's unique textures, Mi texels
 };
 LayoutStudySettings default_layout_study_settings();
 std::vector<std::string> layout_study_options();
 
-// One layout, atlas size and bit rate. Means over frames after the first kWarmUpFrames.
+// One layout, atlas size and bit rate. Means over frames after those of the warm-up.
 struct LayoutRow {
   std::string layout;
   uint32_t width = 0, height = 0;      // of the atlas
@@ -69,8 +70,6 @@ struct LayoutStudyResult {
   std::vector<LayoutPicture>
       pictures;  // of the first scored frame in the last atlas size; not part of the JSON
 };
-// A second at the usual rate: a stream's first pictures are coarse.
-constexpr uint32_t kWarmUpFrames = 30;
 
 nlohmann::json to_json(const LayoutStudyResult& result);
 std::string to_text(const LayoutStudyResult& result);

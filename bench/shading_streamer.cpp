@@ -261,7 +261,7 @@ const Image8& ShadingStreamer::uncoded_atlas() const {
 client::Display& ShadingStreamer::display() {
   return *impl_->display;
 }
-server::Session& ShadingStreamer::session() const {
+server::Session& ShadingStreamer::session() {
   return *impl_->session;
 }
 

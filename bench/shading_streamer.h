@@ -56,7 +56,7 @@ class ShadingStreamer final : public Streamer {
   const server::FrameStats& last_stats() const;  // of the last served frame
   const Image8& uncoded_atlas() const;           // of the current frame; empty without the split
   client::Display& display();                    // as the last picture left it
-  server::Session& session() const;
+  server::Session& session();
 
  private:
   struct Impl;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "absl/functional/function_ref.h"
 #include "atlas/coherent/rectangles.h"
 #include "atlas/coherent/slabs.h"
 #include "atlas/coherent/spacing.h"
@@ -13,7 +14,7 @@ constexpr uint32_t kMaxSide = 8192;    // texels
 constexpr uint64_t kStages = 16;       // of re-placing the atlas: a frame moves at most this part of it
 constexpr float kFullest = 0.75f;      // slabs with a larger share in use are not worth emptying
 constexpr int64_t kGrowthStages = 32;  // as kStages, for growth
-constexpr int kGrowthTries = 16;       // that find no room, a frame
+constexpr size_t kGrowthTries = 16;    // that find no room, a frame
 constexpr float kUrgent = 3;           // growth by so much deserves that others move
 constexpr float kAhead = 0.6f;         // of bias: who grows is likely to come closer still
 constexpr int kFirstTries = 16;        // to find a place for all in the first frame
@@ -43,6 +44,12 @@ void set_size(Placement& p, const RectangleSize& size) {
   p.transposed = size.u < size.v;  // the long side is the width
 }
 
+// Along the side that lacks most, squared, as an area's.
+float growth_of(const RectangleSize& held, const RectangleSize& wished) {
+  const float side = std::max(static_cast<float>(wished.u) / held.u, static_cast<float>(wished.v) / held.v);
+  return side * side;
+}
+
 }  // namespace
 
 struct Layout::Impl {
@@ -55,7 +62,7 @@ struct Layout::Impl {
         most(most_sides(l.width, l.height)) {}
 
   struct Growth {
-    float by;        // samples: wished over held
+    float by;        // growth_of()
     uint32_t index;  // of `now`
     Spacing spacing;
   };
@@ -65,9 +72,11 @@ struct Layout::Impl {
   void fit_first_frame(const LayoutInput& input);
   void follow_bias(const scene::VisiblePatches& visible);
   void choose(const LayoutInput& input);
-  void choose_one(scene::PatchId patch, const Wanted& wanted, const Placement* was, const Spacing& spacing);
+  void choose_one(scene::PatchId patch, const Wanted& wanted, const Placement* was,
+                  absl::FunctionRef<Spacing()> spacing_now);
   void allocate();
   void grow();
+  uvec2 sides_ahead(const Growth& growth, float ahead) const;
   bool take_larger_place(const Growth& growth);
   bool take_place(Placement& p);
   bool take_smaller_place(Placement& p);
@@ -83,11 +92,13 @@ struct Layout::Impl {
   PatchTraitTable traits;
   Slabs slabs;
   AdaptiveTarget target;
+  float needed_bias = 0;  // of the last frame
   BiasFollower bias;
   LayoutStats stats;
   MostSides most;
-  bool memory_short = false;   // after the last frame
-  uint32_t waiting_width = 0;  // of the widest whose growth is urgent and found no room; 0: none
+  bool memory_short = false;  // after the last frame
+  uvec2 waiting{0};           // sides of the first whose growth is urgent and found no room; 0: none
+  bool cleared = false;       // for it
   int frames_to_next_stage = 0, starved_pause = 1, frames_since_shrink = kPauseFrames;
   size_t starved_before = 0;  // the last stage
 
@@ -97,6 +108,7 @@ struct Layout::Impl {
   std::vector<Wanted> wanted;              // a visible patch
   std::vector<uint32_t> moving, entering;  // indices of `now` that need a rectangle; moving ones had one
   std::vector<Growth> growing;             // who should be larger; keeps what it has until then
+  std::vector<uvec2> no_room;              // sides for which none was found
 };
 
 LayoutDelta Layout::Impl::update(const LayoutInput& input) {
@@ -112,8 +124,9 @@ LayoutDelta Layout::Impl::update(const LayoutInput& input) {
 void Layout::Impl::place(const LayoutInput& input) {
   follow_bias(input.visible);
   choose(input);
-  grow();
+  if (cleared) grow();  // else those that made room for it would come back
   allocate();
+  if (!cleared) grow();
 }
 
 // Nothing is shown yet that could move: until all have a place, starts anew with a smaller target. Few large
@@ -138,7 +151,8 @@ void Layout::Impl::follow_bias(const scene::VisiblePatches& visible) {
     wanted.push_back({rectangle_need(v.footprint, t.triangle_count), t.masked});
     stats.ideal_texels += wanted.back().need.area * (t.masked ? 2 : 1);
   }
-  stats.bias = bias.follow(select_bias(wanted, target.texels(), settings.levels, most));
+  needed_bias = select_bias(wanted, target.texels(), settings.levels, most, needed_bias);
+  stats.bias = bias.follow(needed_bias);
 }
 
 // Merges the visible patches with those of the last frame.
@@ -156,8 +170,10 @@ void Layout::Impl::choose(const LayoutInput& input) {
       ++instance;
     const scene::Instance& owner = scene.instances[instance];
     const scene::Geometry& geometry = scene.geometries[owner.geometry];
-    const Spacing spacing = spacing_for(geometry, geometry.patches[patch - owner.first_patch],
-                                        input.transforms[instance], input.eye);
+    const auto spacing = [&] {
+      return spacing_for(geometry, geometry.patches[patch - owner.first_patch], input.transforms[instance],
+                         input.eye);
+    };
     const bool known = old != before.end() && old->patch == patch;
     choose_one(patch, wanted[i], known ? &*old : nullptr, spacing);
     if (known) ++old;
@@ -167,19 +183,27 @@ void Layout::Impl::choose(const LayoutInput& input) {
 
 // A part of the atlas a frame, the smallest for their wish first. What finds no room keeps what it has.
 void Layout::Impl::grow() {
-  waiting_width = 0;
+  waiting = {};
+  no_room.clear();
   if (memory_short) return;
-  std::ranges::sort(growing, std::ranges::greater(), &Growth::by);
-  int64_t budget = int64_t{settings.width} * settings.height / kGrowthStages;
-  int tries = kGrowthTries;
+  std::ranges::sort(growing, [](const Growth& a, const Growth& b) {
+    return a.by != b.by ? a.by > b.by : a.index < b.index;
+  });
+  const int64_t budget = int64_t{settings.width} * settings.height / kGrowthStages;
+  int64_t left = budget;
   for (const Growth& g : growing) {
-    if (budget <= 0 || tries <= 0) break;
-    if (take_larger_place(g)) {
-      budget -= static_cast<int64_t>(now[g.index].texels());
-    } else {
-      --tries;
-    }
+    const uvec2 most_needed = sides_ahead(g, kAhead);
+    const bool first = left == budget;  // whatever its size
+    if (!first && int64_t{most_needed.x} * most_needed.y > left) continue;
+    if (take_larger_place(g)) left -= static_cast<int64_t>(now[g.index].texels());
+    if (no_room.size() >= kGrowthTries) break;
   }
+}
+
+uvec2 Layout::Impl::sides_ahead(const Growth& g, float ahead) const {
+  const Wanted& want = wanted[g.index];
+  return sides_of(select_size(want.need, want.masked, stats.bias - ahead, nullptr, settings.levels, most),
+                  want.masked);
 }
 
 bool Layout::Impl::take_larger_place(const Growth& g) {
@@ -189,18 +213,22 @@ bool Layout::Impl::take_larger_place(const Growth& g) {
   grown.spacing = g.spacing;
   for (const float ahead : {kAhead, 0.0f}) {
     set_size(grown, select_size(want.need, want.masked, stats.bias - ahead, nullptr, settings.levels, most));
-    if (!take_place(grown)) continue;
-    free(p);
-    p = grown;
-    return true;
+    const auto none_smaller = [&](const uvec2& s) { return grown.width >= s.x && grown.height >= s.y; };
+    if (std::ranges::any_of(no_room, none_smaller)) continue;
+    if (take_place(grown)) {
+      free(p);
+      p = grown;
+      return true;
+    }
+    no_room.emplace_back(grown.width, grown.height);
   }
-  if (g.by >= kUrgent) waiting_width = std::max<uint32_t>(waiting_width, grown.width);
+  if (g.by >= kUrgent && waiting.x == 0) waiting = {grown.width, grown.height};
   return false;
 }
 
 // `was`: or nullptr for a patch that was not visible.
 void Layout::Impl::choose_one(scene::PatchId patch, const Wanted& want, const Placement* was,
-                              const Spacing& spacing) {
+                              absl::FunctionRef<Spacing()> spacing_now) {
   const bool had_place = was && was->kind == PlacementKind::block;
   const bool moves = had_place && slabs.closed({was->x, was->y});
   // A patch that is placed anew anyway takes the size that fits it best.
@@ -216,11 +244,11 @@ void Layout::Impl::choose_one(scene::PatchId patch, const Wanted& want, const Pl
     if (had_place) free(*was);
     return;
   }
+  const Spacing spacing = spacing_now();
   const uvec2 sides = sides_of(size, want.masked);
-  const float growth =
-      had_place ? static_cast<float>(sides.x * sides.y) / static_cast<float>(was->texels()) : 0;
-  if (had_place && !moves && (size == held || growth > 1)) {
-    if (growth > 1) growing.push_back({growth, index, spacing});
+  const bool grows = had_place && sides.x * sides.y > was->texels();
+  if (had_place && !moves && (size == held || grows)) {
+    if (grows) growing.push_back({growth_of(held, size), index, spacing});
     p = *was;
     if (!still_good(was->spacing, spacing)) p.spacing = spacing;
     return;
@@ -293,17 +321,20 @@ void Layout::Impl::count(const LayoutDelta& delta) {
 // Chooses the slabs that the next frame empties. While patches starve, one stage follows the other as long as
 // that helps them: what is moved costs bits, and its samples change places.
 void Layout::Impl::plan_stage() {
+  cleared = false;
   if (frames_to_next_stage > 0) --frames_to_next_stage;
   if (starved.empty()) starved_pause = 1;
-  if (!(memory_short || waiting_width > 0) || frames_to_next_stage > 0) return;
+  const bool waits = !memory_short && waiting.x > 0;
+  if (!(memory_short || waits) || frames_to_next_stage > 0) return;
+  const uint64_t most_moved = uint64_t{settings.width} * settings.height / kStages;
+  cleared = waits && slabs.close_for(waiting.x, waiting.y, most_moved);
+  stats.reset = cleared || (memory_short && slabs.close_emptiest(most_moved, kFullest));
+  if (!stats.reset) return;
+  ++stats.resets_total;
   const bool helps = starved.size() < starved_before;
   starved_before = starved.size();
   starved_pause = helps ? 1 : std::min(2 * starved_pause, kMostPauseFrames);
   frames_to_next_stage = starved.empty() ? kPauseFrames : starved_pause;
-  const uint64_t most_moved = uint64_t{settings.width} * settings.height / kStages;
-  stats.reset = starved.empty() && waiting_width > 0 ? slabs.close_for(waiting_width, most_moved)
-                                                     : slabs.close_emptiest(most_moved, kFullest);
-  if (stats.reset) ++stats.resets_total;
 }
 
 // Also calibrates the target (thesis 3.5).

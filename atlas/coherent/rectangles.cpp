@@ -20,7 +20,7 @@ struct WidthTable {
       nearest[i] = kWidths[0];
       for (const uint16_t width : kWidths) {
         const auto distance = [&](uint16_t w) { return w > 2 * i ? w - 2 * i : 2 * i - w; };
-        if (distance(width) <= distance(nearest[i])) nearest[i] = width;
+        if (distance(width) < distance(nearest[i])) nearest[i] = width;
       }
     }
   }
@@ -57,7 +57,8 @@ RectangleSize wish(const RectangleNeed& need, bool masked, float scale, const Mo
                 highest);
   };
   uint16_t width = std::min(kWidthTable.nearest[even(length + 1, kShelfHeight) / 2], widest);
-  if (height_at(width) > width && width < widest) width = next_width(width);
+  // Nearly a square, which is best cut off a little; or one of the next width.
+  if (width < widest && 2 * height_at(width) > width + next_width(width)) width = next_width(width);
   const uint16_t height = std::min(height_at(width), width);
   return u_is_long ? RectangleSize{width, height} : RectangleSize{height, width};
 }
@@ -69,6 +70,10 @@ bool still_fits(const RectangleSize& held, const RectangleSize& wished) {
   const auto enough = [](float has, float wish) { return has >= std::min(kSparsest * wish, wish - 2); };
   return enough(held.u, wished.u) && enough(held.v, wished.v) &&
          static_cast<float>(held.u * held.v) <= kDensest * static_cast<float>(wished.u * wished.v);
+}
+
+bool is_color(const RectangleNeed& need, bool masked, float color_area) {
+  return !(need.area * (masked ? 2.0f : 1.0f) >= color_area);  // true for NaN
 }
 
 uint64_t texels(const RectangleSize& size, bool masked) {
@@ -94,7 +99,7 @@ RectangleSize select_size(const RectangleNeed& need, bool masked, float bias, co
   float color_area = settings.color_area_px2 * std::exp2(bias);
   if (previous)
     color_area *= std::exp2(previous->single_color() ? settings.hysteresis : -settings.hysteresis);
-  if (!(need.area * (masked ? 2.0f : 1.0f) >= color_area)) return {};
+  if (is_color(need, masked, color_area)) return {};
   const RectangleSize size = wish(need, masked, std::exp2(-0.5f * bias), most);
   const bool stays = previous && !previous->single_color() && still_fits(*previous, size);
   return stays ? *previous : size;
@@ -108,14 +113,17 @@ uvec2 sides_of(const RectangleSize& size, bool masked) {
 }
 
 float select_bias(std::span<const Wanted> wanted, double target_texels, const LevelSettings& settings,
-                  const MostSides& most) {
+                  const MostSides& most, float near) {
+  // As select_size() without `previous`; powers of the bias once, not for every patch.
   const auto fits = [&](float bias) {
+    const float color_area = settings.color_area_px2 * std::exp2(bias), scale = std::exp2(-0.5f * bias);
     uint64_t sum = 0;
     for (const Wanted& w : wanted)
-      sum += texels(select_size(w.need, w.masked, bias, nullptr, settings, most), w.masked);
+      if (!is_color(w.need, w.masked, color_area))
+        sum += texels(wish(w.need, w.masked, scale, most), w.masked);
     return static_cast<double>(sum) <= target_texels;
   };
-  return least_bias(settings, fits);
+  return least_bias(settings, fits, near);
 }
 
 }  // namespace tessera::atlas::coherent

@@ -30,7 +30,8 @@ struct MostSides {
 };
 MostSides most_sides(uint32_t atlas_width, uint32_t atlas_height);
 
-// The size at a bias (as in eq. 3.3: 1 halves the area); `previous` (or nullptr) anchors the hysteresis.
+// The size at a bias (as in eq. 3.3: 1 halves the area); `previous` (or nullptr) stays as long as it
+// is good enough.
 RectangleSize select_size(const RectangleNeed& need, bool masked, float bias, const RectangleSize* previous,
                           const LevelSettings& settings, const MostSides& most = {});
 
@@ -38,12 +39,12 @@ RectangleSize select_size(const RectangleNeed& need, bool masked, float bias, co
 uvec2 sides_of(const RectangleSize& size, bool masked);
 
 // The smallest bias at which all rectangles together have at most `target_texels`; clamped to the settings'
-// range. Monotonic: a smaller target never gives a smaller bias.
+// range. Monotonic: a smaller target never gives a smaller bias. `near`: see least_bias().
 struct Wanted {
   RectangleNeed need;
   bool masked = false;
 };
 float select_bias(std::span<const Wanted> wanted, double target_texels, const LevelSettings& settings,
-                  const MostSides& most = {});
+                  const MostSides& most = {}, float near = 0);
 
 }  // namespace tessera::atlas::coherent

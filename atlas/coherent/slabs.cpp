@@ -77,13 +77,27 @@ std::optional<uvec2> Slabs::find(uint32_t width, uint32_t rows) {
   return std::nullopt;
 }
 
+std::optional<uint32_t> Slabs::gap_in(const Shelf& shelf, uint32_t width) {
+  const auto& taken = shelf.taken;
+  if (width % 2 != 0) {
+    const auto gap = std::search_n(taken.rbegin(), taken.rend(), width, 0);
+    if (gap == taken.rend()) return std::nullopt;
+    return static_cast<uint32_t>(taken.rend() - gap) - width;
+  }
+  for (auto gap = taken.begin();; ++gap) {
+    gap = std::search_n(gap, taken.end(), width, 0);
+    if (gap == taken.end()) return std::nullopt;
+    if ((gap - taken.begin()) % 2 == 0) return static_cast<uint32_t>(gap - taken.begin());
+  }
+}
+
 std::optional<uint32_t> Slabs::draw_slab(uint32_t width, uint32_t rows) {
   for (uint32_t s = 0; s < shelves_.size(); ++s) {
     Shelf& shelf = shelves_[s];
     if (shelf.free_units < width || shelf.units < rows) continue;
-    const auto gap = std::search_n(shelf.taken.begin(), shelf.taken.end(), width, 0);
-    if (gap == shelf.taken.end()) continue;
-    std::fill_n(gap, width, uint8_t{1});
+    const std::optional<uint32_t> gap = gap_in(shelf, width);
+    if (!gap) continue;
+    std::fill_n(shelf.taken.begin() + *gap, width, uint8_t{1});
     shelf.free_units -= width;
     if (unused_.empty()) {
       unused_.push_back(static_cast<uint32_t>(slabs_.size()));
@@ -91,7 +105,7 @@ std::optional<uint32_t> Slabs::draw_slab(uint32_t width, uint32_t rows) {
     }
     const uint32_t index = unused_.back();
     unused_.pop_back();
-    const auto x = static_cast<uint16_t>(gap - shelf.taken.begin());
+    const auto x = static_cast<uint16_t>(*gap);
     slabs_[index] = {.x = x,
                      .width = static_cast<uint16_t>(width),
                      .shelf = static_cast<uint16_t>(s),
@@ -159,16 +173,18 @@ std::vector<uint32_t> Slabs::slabs_within(const Shelf& shelf, uint32_t x, uint32
   return within;
 }
 
-bool Slabs::close_for(uint32_t width, uint64_t budget_texels) {
+bool Slabs::close_for(uint32_t width, uint32_t height, uint64_t budget_texels) {
   const uint32_t units = width / kUnit;
   std::vector<uint32_t> cheapest;
   uint64_t least = budget_texels + 1;
   for (const Shelf& shelf : shelves_) {
-    for (uint32_t x = 0; x + units <= shelf.taken.size();) {
+    if (shelf.units < height / kUnit) continue;
+    for (uint32_t x = 0, next = 0; x + units <= shelf.taken.size(); x = next) {
+      next = x + (shelf.taken[x] ? slabs_[shelf.slab_of_x[x]].width : 1);
+      if (units % 2 == 0 && x % 2 != 0) continue;  // see gap_in()
       std::vector<uint32_t> within = slabs_within(shelf, x, units);
       uint64_t texels = 0;
       for (const uint32_t index : within) texels += texels_in(slabs_[index]);
-      x += shelf.taken[x] ? slabs_[shelf.slab_of_x[x]].width : 1;
       if (texels >= least) continue;
       least = texels;
       cheapest = std::move(within);

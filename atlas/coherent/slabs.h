@@ -2,7 +2,7 @@
 // rectangles one below another:
 //
 //   shelf   across the atlas, kShelfHeight texels high (the last may be lower)
-//   slab    as wide as its rectangles, as high as the shelf; drawn when its width runs out of room
+//   slab    as wide as its rectangles (or wider), as high as the shelf; drawn when its width runs out of room
 //   rect    of the slab's width and any even height
 //
 // So both dimensions are packed as intervals of a line, where free neighbours merge by themselves: unlike
@@ -33,7 +33,8 @@ class Slabs {
   Slabs(uint32_t width, uint32_t height);
 
   // Upper left texel of a free rectangle, or nothing if there is no room. Sides: even, 2..kShelfHeight. First
-  // fit, in the slabs of its width, in a new slab, or in the narrowest wider one that has room.
+  // fit, in the slabs of its width, in a new slab, or in the narrowest wider one that has room, up to four
+  // times as wide. Slabs of whole multiples of four texels stand on such, the others at the right end.
   std::optional<uvec2> allocate(uint32_t width, uint32_t height);
   // Gives back what allocate() returned for these sides.
   void free(uvec2 at, uint32_t width, uint32_t height);
@@ -42,9 +43,9 @@ class Slabs {
   // these are freed and placed elsewhere, the slabs return to the shelves. Slabs above `fullest` (share in
   // use) stay open. Returns whether any was closed.
   bool close_emptiest(uint64_t budget_texels, float fullest);
-  // Closes the slabs that stand where a new one of this width is the cheapest to clear, if these hold at most
-  // `budget_texels`. Returns whether any was closed: none if there is room already.
-  bool close_for(uint32_t width, uint64_t budget_texels);
+  // Closes the slabs that stand where a new one for this rectangle is the cheapest to clear, if these hold at
+  // most `budget_texels`. Returns whether any was closed: none if there is room already.
+  bool close_for(uint32_t width, uint32_t height, uint64_t budget_texels);
   bool closed(uvec2 at) const { return slab_at(at).closed; }
   void reopen();
 
@@ -78,6 +79,8 @@ class Slabs {
   std::optional<uvec2> take(uint32_t slab, uint32_t rows);
   std::optional<uvec2> take_from_width(uint32_t width, uint32_t rows);
   std::optional<uint32_t> draw_slab(uint32_t width, uint32_t rows);
+  // Where a slab of this width can stand, in units; any two of which are four texels.
+  static std::optional<uint32_t> gap_in(const Shelf& shelf, uint32_t width);
   void release(uint32_t slab);
 
   std::vector<Shelf> shelves_;

@@ -124,7 +124,7 @@ TEST_F(CoherentLayout, WhatCannotGrowKeepsSamplesAndThenItsPlace) {
   LayoutSettings settings{.width = 640, .height = 256};
   settings.levels.min_bias = settings.levels.max_bias = 0;
   make(3, settings);
-  VisiblePatches visible = rectangles(3, 191, 191);
+  VisiblePatches visible = rectangles(3, 159, 159);
   update(visible);
   ASSERT_EQ(layout_->stats().blocks, 3u);
   visible[1].footprint = {255, 255, 255 * 255};
@@ -244,6 +244,8 @@ TEST(Rectangles, SamplesAreEquallyDenseWhateverTheShape) {
       // Intervals a pixel, both ways together.
       const float density = float(size.u - 1) * float(size.v - 1) / (u * v);
       EXPECT_NEAR(std::log2(density), 0, 0.45f) << u << "x" << v;
+      for (const auto& [has, wish] : {std::pair(size.u, u), std::pair(size.v, v)})
+        EXPECT_NEAR(std::log2(float(has - 1) / wish), 0, 0.42f) << u << "x" << v;
     }
   }
 }

@@ -296,6 +296,28 @@ TEST(SelectBias, StaysInItsRange) {
   EXPECT_EQ(select_bias(std::vector<float>(1000, 64.0f), -5, settings), settings.max_bias);
 }
 
+TEST(LeastBias, IsTheSameWhereverTheSearchBegins) {
+  const LevelSettings settings{.min_bias = -2, .max_bias = 6.3f};
+  for (const float limit : {-5.0f, -2.0f, -1.99f, 0.0f, 0.7f, 6.29f, 6.3f, 9.0f}) {
+    const auto fits = [&](float bias) { return bias >= limit; };
+    const float expected = std::clamp(std::ceil(limit * 64) / 64, settings.min_bias, settings.max_bias);
+    for (const float near : {-1e9f, -2.0f, -1.98f, 0.0f, 0.7f, 3.0f, 6.3f, 1e9f})
+      EXPECT_EQ(least_bias(settings, fits, near), expected) << limit << " from " << near;
+  }
+}
+
+TEST(LeastBias, LooksFewTimesNearTheAnswer) {
+  for (const float limit : {-1.5f, 0.0f, 4.0f}) {
+    int looks = 0;
+    const auto fits = [&](float bias) {
+      ++looks;
+      return bias >= limit;
+    };
+    EXPECT_EQ(least_bias({.min_bias = -2, .max_bias = 6}, fits, limit + 1.0f / 32), limit);
+    EXPECT_LE(looks, 5);
+  }
+}
+
 TEST(AdaptiveTarget, ShrinksAtOnceAndGrowsSlowly) {
   AdaptiveTarget target(1e6);
   const double start = target.texels();

@@ -90,6 +90,38 @@ TEST(Slabs, WhatABudgetIsTooSmallForStopsNoOther) {
   EXPECT_FALSE(slabs.closed(wide));
 }
 
+TEST(Slabs, RoomIsMadeOnlyWhereItIsHighEnough) {
+  Slabs slabs(64, 320);  // the second shelf has 64 rows
+  const uvec2 high = *slabs.allocate(64, 200), low = *slabs.allocate(64, 60);
+  ASSERT_EQ(low.y, 256u);
+  slabs.free(low, 64, 60);
+  EXPECT_TRUE(slabs.close_for(64, 100, 1 << 20)) << "the free shelf is too low";
+  EXPECT_TRUE(slabs.closed(high));
+}
+
+TEST(Slabs, WidthsOfMultiplesOfFourStandOnSuch) {
+  std::mt19937 random(11);
+  Slabs slabs(512, 256);
+  std::vector<std::pair<uvec2, uvec2>> held;
+  for (int i = 0; i < 5000; ++i) {
+    const uvec2 sides(2 * (1 + random() % 24), 2 * (1 + random() % 60));
+    if (const auto at = slabs.allocate(sides.x, sides.y)) held.emplace_back(*at, sides);
+    if (held.size() < 100) continue;
+    std::swap(held[random() % held.size()], held.back());
+    const auto [at, free_sides] = held.back();
+    held.pop_back();
+    slabs.free(at, free_sides.x, free_sides.y);
+  }
+  int on_grid = 0, of = 0;
+  for (const auto& [at, sides] : held) {
+    if (sides.x % 4 != 0) continue;  // these may have taken a wider slab, too
+    ++of;
+    on_grid += at.x % 4 == 0;
+  }
+  EXPECT_GT(of, 20);
+  EXPECT_GE(on_grid, 9 * of / 10) << "but for those in slabs of other widths";
+}
+
 TEST(Slabs, RoomIsMadeWhereItIsCheapest) {
   Slabs slabs(256, 256);
   // Eight slabs; the fourth and the fifth hold least, but for the last, which stands alone.
@@ -100,12 +132,12 @@ TEST(Slabs, RoomIsMadeWhereItIsCheapest) {
     rest.push_back(*slabs.allocate(32, 256 - height));
   }
   for (size_t i = 0; i < rest.size(); ++i) slabs.free(rest[i], 32, 256 - heights[i]);
-  EXPECT_FALSE(slabs.close_for(64, 32 * (60 + 80) - 1)) << "more than may move";
-  ASSERT_TRUE(slabs.close_for(64, 32 * (60 + 80)));
+  EXPECT_FALSE(slabs.close_for(64, 256, 32 * (60 + 80) - 1)) << "more than may move";
+  ASSERT_TRUE(slabs.close_for(64, 256, 32 * (60 + 80)));
   for (size_t i = 0; i < at.size(); ++i) EXPECT_EQ(slabs.closed(at[i]), i == 3 || i == 4) << i;
   slabs.free(at[3], 32, 60);
   slabs.free(at[4], 32, 80);
-  EXPECT_FALSE(slabs.close_for(64, 1 << 20)) << "there is room";
+  EXPECT_FALSE(slabs.close_for(64, 256, 1 << 20)) << "there is room";
   EXPECT_EQ(slabs.allocate(64, 256), uvec2(96, 0));
 }
 

@@ -53,6 +53,7 @@ TEST(LayoutStudy, MeasuresEveryLayout) {
   settings.common.seconds = 0.1;
   settings.common.score_every = 1;
   settings.common.truth_cache = "none";
+  settings.warm_up_frames = 4;
   settings.layouts.emplace_back("l-packing");
   settings.layouts.emplace_back("texel-shading");
   settings.texture_mtexels = 16;
@@ -91,6 +92,33 @@ TEST(LayoutStudy, MeasuresEveryLayout) {
   EXPECT_EQ(nlohmann::json::parse(*json).at("rows").size(), 9u);
   EXPECT_TRUE(std::filesystem::exists(folder.path() / "layouts.html"));
   EXPECT_TRUE(std::filesystem::exists(folder.path() / "layouts-coherent-512x512-atlas.png"));
+}
+
+TEST(LayoutStudy, CodesOneRenderingAtEveryBitRate) {
+  LayoutStudySettings settings = default_layout_study_settings();
+  settings.common.scene = "gallery:0";
+  settings.common.size = {240, 136};
+  settings.common.seconds = 0.1;
+  settings.common.score_every = 3;
+  settings.common.truth_cache = "none";
+  settings.warm_up_frames = 4;
+  settings.layouts = {"coherent"};
+  settings.atlases = {{512, 256}};
+  settings.bitrates_mbps = {0.5, 4};
+  std::ostringstream silent;
+  Progress progress(silent);
+  const auto result = run_layout_study(settings, progress);
+  ASSERT_TRUE(result.ok()) << result.status();
+  ASSERT_EQ(result->rows.size(), 2u);
+  const LayoutRow &low = result->rows[0], &high = result->rows[1];
+  EXPECT_EQ(low.bitrate_mbps, 0.5);
+  EXPECT_EQ(high.bitrate_mbps, 4);
+  EXPECT_EQ(low.samples, high.samples);
+  EXPECT_EQ(low.meta_kbit, high.meta_kbit);
+  EXPECT_EQ(low.error.mssim, high.error.mssim);
+  EXPECT_LT(low.atlas_kbit, high.atlas_kbit);
+  EXPECT_LE(high.atlas_kbit + high.meta_kbit, 1.1 * 4000 / 30);
+  EXPECT_LT(low.coded->mssim, high.coded->mssim);
 }
 
 }  // namespace
