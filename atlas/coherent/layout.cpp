@@ -76,7 +76,7 @@ struct Layout::Impl {
                   absl::FunctionRef<Spacing()> spacing_now);
   void allocate();
   void grow();
-  uvec2 sides_ahead(const Growth& growth, float ahead) const;
+  RectangleSize size_ahead(const Growth& growth, float ahead) const;
   bool take_larger_place(const Growth& growth);
   bool take_place(Placement& p);
   bool take_smaller_place(Placement& p);
@@ -192,7 +192,7 @@ void Layout::Impl::grow() {
   const int64_t budget = int64_t{settings.width} * settings.height / kGrowthStages;
   int64_t left = budget;
   for (const Growth& g : growing) {
-    const uvec2 most_needed = sides_ahead(g, kAhead);
+    const uvec2 most_needed = sides_of(size_ahead(g, kAhead), now[g.index].masked);
     const bool first = left == budget;  // whatever its size
     if (!first && int64_t{most_needed.x} * most_needed.y > left) continue;
     if (take_larger_place(g)) left -= static_cast<int64_t>(now[g.index].texels());
@@ -200,21 +200,19 @@ void Layout::Impl::grow() {
   }
 }
 
-uvec2 Layout::Impl::sides_ahead(const Growth& g, float ahead) const {
+RectangleSize Layout::Impl::size_ahead(const Growth& g, float ahead) const {
   const Wanted& want = wanted[g.index];
-  return sides_of(select_size(want.need, want.masked, stats.bias - ahead, nullptr, settings.levels, most),
-                  want.masked);
+  return select_size(want.need, want.masked, stats.bias - ahead, nullptr, settings.levels, most);
 }
 
 bool Layout::Impl::take_larger_place(const Growth& g) {
   Placement& p = now[g.index];
-  const Wanted& want = wanted[g.index];
   Placement grown = p;
   grown.spacing = g.spacing;
   for (const float ahead : {kAhead, 0.0f}) {
-    set_size(grown, select_size(want.need, want.masked, stats.bias - ahead, nullptr, settings.levels, most));
-    const auto none_smaller = [&](const uvec2& s) { return grown.width >= s.x && grown.height >= s.y; };
-    if (std::ranges::any_of(no_room, none_smaller)) continue;
+    set_size(grown, size_ahead(g, ahead));
+    const auto is_no_smaller = [&](const uvec2& s) { return grown.width >= s.x && grown.height >= s.y; };
+    if (std::ranges::any_of(no_room, is_no_smaller)) continue;
     if (take_place(grown)) {
       free(p);
       p = grown;

@@ -46,7 +46,7 @@ TEST(CompareLayouts, AtEqualSamplesAndAtEqualError) {
   EXPECT_FALSE(to_b[0].dssim_ratio) << "one point is no curve";
 }
 
-TEST(LayoutStudy, MeasuresEveryLayout) {
+LayoutStudySettings small_study() {
   LayoutStudySettings settings = default_layout_study_settings();
   settings.common.scene = "gallery:0";
   settings.common.size = {240, 136};
@@ -54,14 +54,23 @@ TEST(LayoutStudy, MeasuresEveryLayout) {
   settings.common.score_every = 1;
   settings.common.truth_cache = "none";
   settings.warm_up_frames = 4;
+  return settings;
+}
+
+StatusOr<LayoutStudyResult> run_silently(const LayoutStudySettings& settings) {
+  std::ostringstream silent;
+  Progress progress(silent);
+  return run_layout_study(settings, progress);
+}
+
+TEST(LayoutStudy, MeasuresEveryLayout) {
+  LayoutStudySettings settings = small_study();
   settings.layouts.emplace_back("l-packing");
   settings.layouts.emplace_back("texel-shading");
   settings.texture_mtexels = 16;
   settings.atlases = {{512, 256}, {512, 512}};
   settings.bitrates_mbps = {4};
-  std::ostringstream silent;
-  Progress progress(silent);
-  const auto result = run_layout_study(settings, progress);
+  const auto result = run_silently(settings);
   ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_EQ(result->frames, 3u);
   ASSERT_EQ(result->rows.size(), 9u);
@@ -95,19 +104,11 @@ TEST(LayoutStudy, MeasuresEveryLayout) {
 }
 
 TEST(LayoutStudy, CodesOneRenderingAtEveryBitRate) {
-  LayoutStudySettings settings = default_layout_study_settings();
-  settings.common.scene = "gallery:0";
-  settings.common.size = {240, 136};
-  settings.common.seconds = 0.1;
-  settings.common.score_every = 3;
-  settings.common.truth_cache = "none";
-  settings.warm_up_frames = 4;
+  LayoutStudySettings settings = small_study();
   settings.layouts = {"coherent"};
   settings.atlases = {{512, 256}};
   settings.bitrates_mbps = {0.5, 4};
-  std::ostringstream silent;
-  Progress progress(silent);
-  const auto result = run_layout_study(settings, progress);
+  const auto result = run_silently(settings);
   ASSERT_TRUE(result.ok()) << result.status();
   ASSERT_EQ(result->rows.size(), 2u);
   const LayoutRow &low = result->rows[0], &high = result->rows[1];
