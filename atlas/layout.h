@@ -19,12 +19,13 @@ enum class LayoutKind : uint8_t {
   tessellated,  // Tessellated Shading Streaming: each triangle as an L or two staircases, placed anew each
                 // frame
 };
+constexpr LayoutKind kDefaultLayout = LayoutKind::coherent;
 constexpr std::string_view kLayoutNames[] = {"blocks", "coherent", "tessellated"};  // by LayoutKind
 
 constexpr float kDefaultSlantedness = 4;
 
 struct LayoutSettings {
-  LayoutKind kind = LayoutKind::blocks;
+  LayoutKind kind = kDefaultLayout;
   uint32_t width = 2048, height = 1024;  // texels; blocks: multiples of the superblock's side; at most 8192
   uint8_t superblock_log = 8;            // blocks
   float high_water = 0.96f;              // share of the memory in use above which it is re-placed, in stages
@@ -52,7 +53,7 @@ struct LayoutStats {
   uint32_t halves = 0;         // among the blocks: triangles of kind halves
   uint32_t blocks_halved = 0;  // placed in this frame smaller than wished, for want of memory
   uint32_t changed = 0, removed = 0;
-  bool reset = false;  // this frame re-placed everything, or a stage of it
+  bool reset = false;  // this frame re-placed everything, or a large stage of it
   uint32_t resets_total = 0;
 };
 

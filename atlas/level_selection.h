@@ -78,7 +78,8 @@ class BiasFollower {
 // grows it.
 class AdaptiveTarget {
  public:
-  explicit AdaptiveTarget(double atlas_texels) : atlas_texels_(atlas_texels), share_(0.8) {}
+  explicit AdaptiveTarget(double atlas_texels, double share = 0.8)
+      : atlas_texels_(atlas_texels), share_(share) {}
   double texels() const { return share_ * atlas_texels_; }
   void on_out_of_memory();
   void on_quiet_frame();

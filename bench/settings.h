@@ -46,7 +46,7 @@ struct LoopbackSettings {
   double server_fps = 30;
   double server_ms = 33.3;  // charged to a server frame in virtual time
   Size atlas{2048, 1024};
-  atlas::LayoutKind layout = atlas::LayoutKind::blocks;
+  atlas::LayoutKind layout = atlas::kDefaultLayout;
   AtlasCodec codec = AtlasCodec::h264;
   double bitrate_mbps = 20;  // atlas and meta together
   Prediction pvs = Prediction::linear;

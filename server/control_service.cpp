@@ -82,8 +82,9 @@ Status read(const v1::Density& density, SessionSettings& settings) {
 StatusOr<atlas::LayoutKind> layout_kind(v1::SessionSettings& s) {
   switch (s.layout()) {
     case v1::LAYOUT_UNSPECIFIED:
-      s.set_layout(v1::LAYOUT_BLOCKS);
-      return atlas::LayoutKind::blocks;
+      static_assert(atlas::kDefaultLayout == atlas::LayoutKind::coherent);
+      s.set_layout(v1::LAYOUT_COHERENT);
+      return atlas::kDefaultLayout;
     case v1::LAYOUT_BLOCKS:
       return atlas::LayoutKind::blocks;
     case v1::LAYOUT_COHERENT:

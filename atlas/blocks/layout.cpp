@@ -64,7 +64,7 @@ struct Places {
 
 LayoutSettings settings_for(uint32_t width, uint32_t height) {
   constexpr uint64_t kLeastSuperblocks = 128;
-  LayoutSettings settings{.width = width, .height = height};
+  LayoutSettings settings{.kind = LayoutKind::blocks, .width = width, .height = height};
   while (settings.superblock_log > kMinLog &&
          ((uint64_t{width} * height) >> (2 * settings.superblock_log)) < kLeastSuperblocks) {
     --settings.superblock_log;

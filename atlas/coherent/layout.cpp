@@ -10,17 +10,21 @@
 namespace tessera::atlas::coherent {
 namespace {
 
-constexpr uint32_t kMaxSide = 8192;    // texels
-constexpr uint64_t kStages = 16;       // of re-placing the atlas: a frame moves at most this part of it
-constexpr float kFullest = 0.75f;      // slabs with a larger share in use are not worth emptying
-constexpr int64_t kGrowthStages = 32;  // as kStages, for growth
-constexpr size_t kGrowthTries = 16;    // that find no room, a frame
-constexpr float kUrgent = 3;           // growth by so much deserves that others move
-constexpr float kAhead = 0.6f;         // of bias: who grows is likely to come closer still
-constexpr int kFirstTries = 16;        // to find a place for all in the first frame
-constexpr int kPauseFrames = 15;       // after a stage that served no need
-constexpr int kMostPauseFrames = 240;  // doubled for each stage in a row that helped nobody
-constexpr int kHalvings = 3;           // of a rectangle's area, where there is no room for all of it
+constexpr uint32_t kMaxSide = 8192;      // texels
+constexpr double kFirstTarget = 0.88;    // share of the atlas
+constexpr uint64_t kStages = 16;         // of re-placing the atlas: a frame moves at most this part of it
+constexpr uint64_t kGentleStages = 256;  // likewise, while all have a place
+constexpr float kFullest = 0.75f;        // slabs with a larger share in use are not worth emptying
+constexpr int64_t kGrowthStages = 32;    // as kStages, for growth
+constexpr size_t kGrowthTries = 16;      // that find no room, a frame
+constexpr float kUrgent = 3;             // growth by so much deserves that others move
+constexpr float kAhead = 0.8f;           // of bias: who grows is likely to come closer still
+constexpr int kFirstTries = 16;          // to find a place for all in the first frame
+constexpr int kPauseFrames = 15;         // after a stage that served no need
+constexpr int kMostPauseFrames = 240;    // doubled for each stage in a row that helped nobody
+constexpr int kMostShortFrames = 60;     // then the target is too large
+constexpr size_t kFewHalved = 64;        // one in so many does not tell that the target is too large
+constexpr int kHalvings = 3;             // of a rectangle's area, where there is no room for all of it
 
 Status check(const LayoutSettings& s) {
   for (const uint32_t side : {s.width, s.height}) {
@@ -58,7 +62,7 @@ struct Layout::Impl {
         settings(l),
         traits(s),
         slabs(l.width, l.height),
-        target(l.width * double(l.height)),
+        target(l.width * double(l.height), kFirstTarget),
         most(most_sides(l.width, l.height)) {}
 
   struct Growth {
@@ -78,11 +82,13 @@ struct Layout::Impl {
   void grow();
   RectangleSize size_ahead(const Growth& growth, float ahead) const;
   bool take_larger_place(const Growth& growth);
-  bool take_place(Placement& p);
+  bool take_place(Placement& p, bool may_draw = true);
   bool take_smaller_place(Placement& p);
+  void clear_gently();
   void plan_stage();
   void count(const LayoutDelta& delta);
   void plan_next_frame();
+  uint64_t texels() const { return uint64_t{settings.width} * settings.height; }
   void free(const Placement& p) {
     if (p.kind == PlacementKind::block) slabs.free({p.x, p.y}, p.width, p.height);
   }
@@ -99,6 +105,8 @@ struct Layout::Impl {
   bool memory_short = false;  // after the last frame
   uvec2 waiting{0};           // sides of the first whose growth is urgent and found no room; 0: none
   bool cleared = false;       // for it
+  int frames_to_gentle_stage = 0;
+  int frames_short = 0;  // in a row, while some should grow
   int frames_to_next_stage = 0, starved_pause = 1, frames_since_shrink = kPauseFrames;
   size_t starved_before = 0;  // the last stage
 
@@ -181,22 +189,22 @@ void Layout::Impl::choose(const LayoutInput& input) {
   for (; old != before.end(); ++old) free(*old);
 }
 
-// A part of the atlas a frame, the smallest for their wish first. What finds no room keeps what it has.
+// A part of the atlas a frame, the smallest for their wish first. What finds no room keeps what it has. While
+// memory is short, only in gaps: the last room for slabs is for those that have nothing.
 void Layout::Impl::grow() {
   waiting = {};
   no_room.clear();
-  if (memory_short) return;
   std::ranges::sort(growing, [](const Growth& a, const Growth& b) {
     return a.by != b.by ? a.by > b.by : a.index < b.index;
   });
-  const int64_t budget = int64_t{settings.width} * settings.height / kGrowthStages;
+  const int64_t budget = static_cast<int64_t>(texels()) / kGrowthStages;
   int64_t left = budget;
   for (const Growth& g : growing) {
     const uvec2 most_needed = sides_of(size_ahead(g, kAhead), now[g.index].masked);
     const bool first = left == budget;  // whatever its size
     if (!first && int64_t{most_needed.x} * most_needed.y > left) continue;
     if (take_larger_place(g)) left -= static_cast<int64_t>(now[g.index].texels());
-    if (no_room.size() >= kGrowthTries) break;
+    if (!memory_short && no_room.size() >= kGrowthTries) break;
   }
 }
 
@@ -211,16 +219,19 @@ bool Layout::Impl::take_larger_place(const Growth& g) {
   grown.spacing = g.spacing;
   for (const float ahead : {kAhead, 0.0f}) {
     set_size(grown, size_ahead(g, ahead));
-    const auto is_no_smaller = [&](const uvec2& s) { return grown.width >= s.x && grown.height >= s.y; };
+    // What stands holds rooms of its widths only; a new slab could hold what is narrower, too.
+    const auto is_no_smaller = [&](const uvec2& s) {
+      return (memory_short ? grown.width == s.x : grown.width >= s.x) && grown.height >= s.y;
+    };
     if (std::ranges::any_of(no_room, is_no_smaller)) continue;
-    if (take_place(grown)) {
+    if (take_place(grown, !memory_short)) {
       free(p);
       p = grown;
       return true;
     }
     no_room.emplace_back(grown.width, grown.height);
   }
-  if (g.by >= kUrgent && waiting.x == 0) waiting = {grown.width, grown.height};
+  if (g.by >= kUrgent && waiting.x == 0 && !memory_short) waiting = {grown.width, grown.height};
   return false;
 }
 
@@ -257,8 +268,8 @@ void Layout::Impl::choose_one(scene::PatchId patch, const Wanted& want, const Pl
   (had_place ? moving : entering).push_back(index);
 }
 
-bool Layout::Impl::take_place(Placement& p) {
-  const auto at = slabs.allocate(p.width, p.height);
+bool Layout::Impl::take_place(Placement& p, bool may_draw) {
+  const auto at = slabs.allocate(p.width, p.height, may_draw);
   if (!at) return false;
   p.x = static_cast<uint16_t>(at->x);
   p.y = static_cast<uint16_t>(at->y);
@@ -316,17 +327,29 @@ void Layout::Impl::count(const LayoutDelta& delta) {
   stats.removed = static_cast<uint32_t>(delta.removed.size());
 }
 
-// Chooses the slabs that the next frame empties. While patches starve, one stage follows the other as long as
-// that helps them: what is moved costs bits, and its samples change places.
+// As few texels as make a slab empty, and then none until the mean is small.
+void Layout::Impl::clear_gently() {
+  if (--frames_to_gentle_stage > 0) return;
+  frames_to_gentle_stage = kPauseFrames;
+  bool closed = false;
+  for (uint64_t stages = kGentleStages; stages >= kStages && !closed; stages /= 2) {
+    closed = slabs.close_emptiest(texels() / stages, kFullest);
+    if (closed) frames_to_gentle_stage = static_cast<int>(kGentleStages / stages);
+  }
+}
+
+// Chooses the slabs that the next frame empties: little by little while all have a place, for what is moved
+// costs bits. While patches starve, one stage follows the other as long as that helps them.
 void Layout::Impl::plan_stage() {
   cleared = false;
   if (frames_to_next_stage > 0) --frames_to_next_stage;
   if (starved.empty()) starved_pause = 1;
+  if (memory_short && starved.empty()) clear_gently();
   const bool waits = !memory_short && waiting.x > 0;
-  if (!(memory_short || waits) || frames_to_next_stage > 0) return;
-  const uint64_t most_moved = uint64_t{settings.width} * settings.height / kStages;
+  if ((starved.empty() && !waits) || frames_to_next_stage > 0) return;
+  const uint64_t most_moved = texels() / kStages;
   cleared = waits && slabs.close_for(waiting.x, waiting.y, most_moved);
-  stats.reset = cleared || (memory_short && slabs.close_emptiest(most_moved, kFullest));
+  stats.reset = cleared || (!waits && slabs.close_emptiest(most_moved, kFullest));
   if (!stats.reset) return;
   ++stats.resets_total;
   const bool helps = starved.size() < starved_before;
@@ -342,7 +365,10 @@ void Layout::Impl::plan_next_frame() {
   stats.reset = false;
   plan_stage();
   ++frames_since_shrink;
-  if (is_starved && frames_since_shrink >= kPauseFrames) {
+  frames_short = memory_short && !growing.empty() ? frames_short + 1 : 0;
+  const bool too_much = !starved.empty() || stats.blocks_halved > now.size() / kFewHalved ||
+                        frames_short % kMostShortFrames == kMostShortFrames - 1;
+  if (too_much && frames_since_shrink >= kPauseFrames) {
     target.on_out_of_memory();
     frames_since_shrink = 0;
   } else if (!memory_short && stats.bias > settings.levels.min_bias) {

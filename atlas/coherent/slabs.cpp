@@ -60,15 +60,16 @@ std::optional<uvec2> Slabs::take_from_width(uint32_t width, uint32_t rows) {
   return std::nullopt;
 }
 
-std::optional<uvec2> Slabs::allocate(uint32_t width, uint32_t height) {
+std::optional<uvec2> Slabs::allocate(uint32_t width, uint32_t height, bool may_draw) {
   assert(width >= kUnit && width <= kShelfHeight && height >= kUnit && height <= kShelfHeight);
-  const auto at = find(width / kUnit, height / kUnit);
+  const auto at = find(width / kUnit, height / kUnit, may_draw);
   if (at) used_texels_ += uint64_t{width} * height;
   return at;
 }
 
-std::optional<uvec2> Slabs::find(uint32_t width, uint32_t rows) {
+std::optional<uvec2> Slabs::find(uint32_t width, uint32_t rows, bool may_draw) {
   if (const auto at = take_from_width(width, rows)) return at;
+  if (!may_draw) return std::nullopt;
   if (const auto slab = draw_slab(width, rows)) return take(*slab, rows);
   // Better too wide than none.
   for (uint32_t wider = width + 1; wider <= std::min(4 * width, kShelfHeight / kUnit); ++wider) {
@@ -143,9 +144,12 @@ bool Slabs::close_emptiest(uint64_t budget_texels, float fullest) {
     uint32_t index;
   };
   std::vector<Candidate> candidates;
+  std::array<uint32_t, kShelfHeight / kUnit + 1> room{};  // rows free in slabs of a width
   for (const auto& slabs : by_width_) {
     for (const uint32_t index : slabs) {
       const Slab& slab = slabs_[index];
+      if (slab.closed) continue;
+      room[slab.width] += shelves_[slab.shelf].units - slab.used;
       const float share = static_cast<float>(slab.used) / static_cast<float>(shelves_[slab.shelf].units);
       if (share <= fullest) candidates.push_back({share, index});
     }
@@ -157,7 +161,10 @@ bool Slabs::close_emptiest(uint64_t budget_texels, float fullest) {
   for (const Candidate& candidate : candidates) {
     Slab& slab = slabs_[candidate.index];
     const uint64_t texels = texels_in(slab);
-    if (texels > budget_texels) continue;
+    // All of its height is no longer there: the free part, and what the rest takes elsewhere.
+    const uint32_t height = shelves_[slab.shelf].units;
+    if (texels > budget_texels || room[slab.width] < height) continue;
+    room[slab.width] -= height;
     budget_texels -= texels;
     slab.closed = closed = true;
   }

@@ -33,15 +33,17 @@ class Slabs {
   Slabs(uint32_t width, uint32_t height);
 
   // Upper left texel of a free rectangle, or nothing if there is no room. Sides: even, 2..kShelfHeight. First
-  // fit, in the slabs of its width, in a new slab, or in the narrowest wider one that has room, up to four
-  // times as wide. Slabs of whole multiples of four texels stand on such, the others at the right end.
-  std::optional<uvec2> allocate(uint32_t width, uint32_t height);
+  // fit, in the slabs of its width; if it may draw, else in a new slab, or in the narrowest wider one that
+  // has room, up to four times as wide. Slabs of whole multiples of four texels stand on such, the others at
+  // the right end.
+  std::optional<uvec2> allocate(uint32_t width, uint32_t height, bool may_draw = true);
   // Gives back what allocate() returned for these sides.
   void free(uvec2 at, uint32_t width, uint32_t height);
 
   // Closes the emptiest slabs to allocate(), together holding at most `budget_texels` in rectangles: once
   // these are freed and placed elsewhere, the slabs return to the shelves. Slabs above `fullest` (share in
-  // use) stay open. Returns whether any was closed.
+  // use) stay open, and those whose rectangles are higher in sum than the gaps in the others of their width.
+  // Returns whether any was closed.
   bool close_emptiest(uint64_t budget_texels, float fullest);
   // Closes the slabs that stand where a new one for this rectangle is the cheapest to clear, if these hold at
   // most `budget_texels`. Returns whether any was closed: none if there is room already.
@@ -75,7 +77,7 @@ class Slabs {
   uint64_t texels_in(const Slab& slab) const { return uint64_t{slab.used} * slab.width * kUnit * kUnit; }
   // The slabs of a shelf that stand in `width` units from `x` on, where a slab or a free unit begins.
   std::vector<uint32_t> slabs_within(const Shelf& shelf, uint32_t x, uint32_t width) const;
-  std::optional<uvec2> find(uint32_t width, uint32_t rows);
+  std::optional<uvec2> find(uint32_t width, uint32_t rows, bool may_draw);
   std::optional<uvec2> take(uint32_t slab, uint32_t rows);
   std::optional<uvec2> take_from_width(uint32_t width, uint32_t rows);
   std::optional<uint32_t> draw_slab(uint32_t width, uint32_t rows);

@@ -180,6 +180,60 @@ TEST_F(CoherentLayout, StagesMakeRoomAndMoveLittleAFrame) {
   EXPECT_LT(frames, 150u);
 }
 
+// Holes everywhere that serve nothing: of the widths that are there, too low for what is there.
+TEST_F(CoherentLayout, AFullAtlasWithUselessGapsComesToRest) {
+  LayoutSettings settings{.width = 1024, .height = 512};
+  settings.levels.min_bias = settings.levels.max_bias = 0;
+  make(800, settings);
+  std::mt19937 random(3);
+  VisiblePatches visible;
+  for (uint32_t i = 0; i < 800; ++i) {
+    const float side = 10.0f + static_cast<float>(random() % 60);
+    visible.push_back({i, {side, 0.8f * side, 0.8f * side * side}});
+  }
+  update(visible);
+  for (const uint32_t keep : {3u, 2u}) {
+    std::erase_if(visible, [&](const auto&) { return random() % keep == 0; });
+    update(visible);
+  }
+  uint64_t moved = 0;
+  for (int frame = 0; frame < 1000; ++frame) {
+    const auto changed = update(visible).changed.size();
+    if (frame >= 500) moved += changed;
+  }
+  EXPECT_LE(moved, visible.size() / 4) << "in 500 frames that all look the same";
+}
+
+// Whatever crowd left the memory as it is: who looks on gets the samples that all have, after a while.
+TEST_F(CoherentLayout, WhatFoundTooLittleRoomRecovers) {
+  for (uint32_t seed = 0; seed < 8; ++seed) {
+    mirror_.clear();
+    make(1200, {.width = 512, .height = 512});
+    std::mt19937 random(seed);
+    const auto crowd = [&](uint32_t from, uint32_t to) {
+      VisiblePatches visible;
+      for (uint32_t i = from; i < to; ++i) {
+        const float side = 6.0f + static_cast<float>(random() % 50);
+        visible.push_back({i, {side, 0.7f * side, 0.7f * side * side}});
+      }
+      return visible;
+    };
+    update(crowd(0, 400));
+    const VisiblePatches visible = crowd(200, 1100);
+    for (int frame = 0; frame < 1500; ++frame) update(visible);
+    EXPECT_EQ(layout_->stats().colors_out_of_memory, 0u) << seed;
+    const float scale = std::exp2(-0.5f * layout_->stats().bias);
+    uint32_t sparse = 0;
+    for (const scene::VisiblePatch& v : visible) {
+      const Placement& p = mirror_.at(v.patch);
+      if (p.kind != PlacementKind::block) continue;
+      const float wished = scale * scale * v.footprint.u_px * v.footprint.v_px;
+      sparse += static_cast<float>(p.texels()) < 0.45f * wished;
+    }
+    EXPECT_EQ(sparse, 0u) << seed;
+  }
+}
+
 TEST_F(CoherentLayout, SpacingIsFrozenWhileItIsGood) {
   make(50);
   const VisiblePatches visible = rectangles(50, 20, 20);

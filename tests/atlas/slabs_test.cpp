@@ -81,13 +81,36 @@ TEST(Slabs, ANarrowRectangleTakesAWiderSlabBeforeItGoesWithout) {
   EXPECT_EQ(slabs.stats().used_texels, 0u);
 }
 
+// A slab with `height` rows in use, and another of its width that has room for them. Returns where they are.
+uvec2 allocate_movable(Slabs& slabs, uint32_t width, uint32_t height) {
+  const uvec2 gap = *slabs.allocate(width, 152);
+  slabs.allocate(width, 104);
+  const uvec2 at = *slabs.allocate(width, height);
+  slabs.free(gap, width, 152);
+  return at;
+}
+
 TEST(Slabs, WhatABudgetIsTooSmallForStopsNoOther) {
-  Slabs slabs(256, 256);
-  const uvec2 wide = *slabs.allocate(192, 60), narrow = *slabs.allocate(16, 128);
+  Slabs slabs(512, 256);
+  const uvec2 wide = allocate_movable(slabs, 192, 60), narrow = allocate_movable(slabs, 16, 100);
   EXPECT_FALSE(slabs.close_emptiest(1024, 0.75f)) << "each holds more";
   EXPECT_TRUE(slabs.close_emptiest(4096, 0.75f));
   EXPECT_TRUE(slabs.closed(narrow)) << "though it is fuller";
   EXPECT_FALSE(slabs.closed(wide));
+}
+
+// It would draw a new slab.
+TEST(Slabs, WhatHasNoRoomInOthersOfItsWidthStays) {
+  Slabs slabs(512, 256);
+  const uvec2 alone = *slabs.allocate(64, 10), first = *slabs.allocate(32, 150),
+              second = *slabs.allocate(32, 120);
+  EXPECT_FALSE(slabs.close_emptiest(uint64_t{1} << 30, 0.75f));
+  slabs.free(second, 32, 120);
+  const uvec2 lower = *slabs.allocate(32, 106);
+  slabs.allocate(32, 90);
+  slabs.free(lower, 32, 106);
+  EXPECT_TRUE(slabs.close_emptiest(uint64_t{1} << 30, 0.75f));
+  EXPECT_FALSE(slabs.closed(alone) || slabs.closed(first));
 }
 
 TEST(Slabs, RoomIsMadeOnlyWhereItIsHighEnough) {
@@ -142,17 +165,19 @@ TEST(Slabs, RoomIsMadeWhereItIsCheapest) {
 }
 
 TEST(Slabs, ClosedSlabsAreTheEmptiestAndTakeNothing) {
-  Slabs slabs(64, 256);
-  const uvec2 full = *slabs.allocate(16, 256), half = *slabs.allocate(32, 128),
-              sparse = *slabs.allocate(8, 2);
+  Slabs slabs(16 + 2 * 32 + 2 * 8, 256);
+  const uvec2 full = *slabs.allocate(16, 256), half = allocate_movable(slabs, 32, 100),
+              sparse = allocate_movable(slabs, 8, 2);
   slabs.close_emptiest(8 * 2, 0.75f);
   EXPECT_TRUE(slabs.closed(sparse));
   EXPECT_FALSE(slabs.closed(half) || slabs.closed(full));
   slabs.close_emptiest(uint64_t{1} << 30, 0.75f);
   EXPECT_TRUE(slabs.closed(half));
   EXPECT_FALSE(slabs.closed(full)) << "fuller than asked for";
+  ASSERT_TRUE(slabs.allocate(32, 152).has_value()) << "in the other slab";
   EXPECT_FALSE(slabs.allocate(32, 8).has_value());
-  slabs.free(half, 32, 128);
+  slabs.free(half, 32, 100);
+  EXPECT_FALSE(slabs.allocate(32, 8, false).has_value()) << "needs a new slab";
   EXPECT_TRUE(slabs.allocate(32, 8).has_value()) << "an emptied slab returns to its shelf";
   slabs.reopen();
   EXPECT_FALSE(slabs.closed(sparse));

@@ -39,10 +39,7 @@ SessionSettings small_settings() {
   s.client_view.width = 320;
   s.client_view.height = 180;
   s.client_view.fov = Fov::symmetric(1.0f, 16.0f / 9.0f);
-  s.layout.width = 512;
-  s.layout.height = 256;
-  s.layout.superblock_log = 6;
-  s.layout.levels.max_log = 6;
+  s.layout = atlas::layout_settings(atlas::LayoutKind::blocks, 512, 256);
   s.rate.bitrate_bps = 8e6;
   return s;
 }
