@@ -410,8 +410,8 @@ StatusOr<CodecStudyResult> run_codec_study(const CodecStudySettings& settings, P
 }
 
 void add_options(CLI::App& app, CodecStudySettings& settings) {
-  const std::vector<std::string> common = {"scene", "path",       "start",  "size",
-                                           "fov-y", "server-fps", "device", "json"};
+  const std::vector<std::string> common = {"scene",  "path",       "start",  "size", "fov-y",
+                                           "layout", "server-fps", "device", "json"};
   add_options(app, settings.common, common);
   app.add_option("--mtexels", settings.mtexels, "atlas sizes in Mi texels: 1, 2, 4, 8, 16 or 32")
       ->delimiter(',')

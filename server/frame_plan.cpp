@@ -52,7 +52,7 @@ FramePlan make_frame_plan(const scene::Features& features, const atlas::DensityS
       {"id_opaque", true, "always"},
       needed("id_masked", features.alpha_mask, "alpha-masked materials"),
       density_pass(density),
-      {"layout", true, "always: levels and block memory"},
+      {"layout", true, "always: sizes and places in the atlas"},
       {"gather", true, "always: shades the placed samples"},
       needed("coverage", features.alpha_mask, "alpha-masked materials"),
       needed("normal_maps", features.normal_maps, "normal maps"),
