@@ -74,8 +74,7 @@ class BiasFollower {
   bool has_bias_ = false;
 };
 
-// The target S, calibrated by experience (thesis 3.5): a reset because memory ran out shrinks it, quiet time
-// grows it.
+// The target S, calibrated by experience (thesis 3.5): memory that ran out shrinks it, quiet time grows it.
 class AdaptiveTarget {
  public:
   explicit AdaptiveTarget(double atlas_texels, double share = 0.8)

@@ -3,7 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
-#include <sstream>
+
+#include "silent_run.h"
 
 namespace tessera::bench {
 namespace {
@@ -14,9 +15,7 @@ TEST(CodecStudy, EmptySquaresAreSparedByJpegAndEveryRowIsFilledIn) {
   settings.common.size = {320, 180};
   settings.mtexels = {1};
   settings.rounds = 1;
-  std::ostringstream silent;
-  Progress progress(silent);
-  const auto result = run_codec_study(settings, progress);
+  const auto result = run_silently(run_codec_study, settings);
   ASSERT_TRUE(result.ok()) << result.status();
   ASSERT_EQ(result->rows.size(), 4u);
   for (const CodecRow& row : result->rows) {

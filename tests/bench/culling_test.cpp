@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <sstream>
+#include "silent_run.h"
 
 namespace tessera::bench {
 namespace {
@@ -13,9 +13,7 @@ TEST(Culling, LeavesTheVisibleSetAndSpareTriangles) {
   settings.path = "city";
   settings.seconds = 0.1;
   settings.size = {160, 90};
-  std::ostringstream silent;
-  Progress progress(silent);
-  const auto result = run_culling(settings, progress);
+  const auto result = run_silently(run_culling, settings);
   ASSERT_TRUE(result.ok()) << result.status();
   ASSERT_EQ(result->frames.size(), 3u);
   EXPECT_EQ(result->differing_patches(), 0u);

@@ -4,10 +4,10 @@
 
 #include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 
 #include "bench/file_io.h"
 #include "bench/temporary_folder.h"
+#include "silent_run.h"
 
 namespace tessera::bench {
 namespace {
@@ -22,14 +22,8 @@ GatherStudySettings small_study(Size size, uint32_t samples) {
   return settings;
 }
 
-StatusOr<GatherStudyResult> run_silently(const GatherStudySettings& settings) {
-  std::ostringstream silent;
-  Progress progress(silent);
-  return run_gather_study(settings, progress);
-}
-
 TEST(GatherStudy, EveryLoadIsShadedOnEveryPath) {
-  const auto result = run_silently(small_study({320, 180}, 20'000));
+  const auto result = run_silently(run_gather_study, small_study({320, 180}, 20'000));
   ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_GT(result->covered, 0.5);
   EXPECT_GT(result->forward_ns.median, result->shading_ns.median);
@@ -77,7 +71,7 @@ TEST(GatherStudy, EveryLoadIsShadedOnEveryPath) {
 TEST(GatherStudy, OnlyTheGroupsThatWereAskedFor) {
   GatherStudySettings settings = small_study({160, 90}, 2'000);
   settings.groups = {"l"};
-  const auto result = run_silently(settings);
+  const auto result = run_silently(run_gather_study, settings);
   ASSERT_TRUE(result.ok()) << result.status();
   ASSERT_FALSE(result->rows.empty());
   for (const GatherRow& row : result->rows) EXPECT_EQ(row.group, "l");

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "bench/file_io.h"
 #include "bench/temporary_folder.h"
+#include "silent_run.h"
 
 namespace tessera::bench {
 namespace {
@@ -57,12 +57,6 @@ LayoutStudySettings small_study() {
   return settings;
 }
 
-StatusOr<LayoutStudyResult> run_silently(const LayoutStudySettings& settings) {
-  std::ostringstream silent;
-  Progress progress(silent);
-  return run_layout_study(settings, progress);
-}
-
 TEST(LayoutStudy, MeasuresEveryLayout) {
   LayoutStudySettings settings = small_study();
   settings.layouts.emplace_back("l-packing");
@@ -70,7 +64,7 @@ TEST(LayoutStudy, MeasuresEveryLayout) {
   settings.texture_mtexels = 16;
   settings.atlases = {{512, 256}, {512, 512}};
   settings.bitrates_mbps = {4};
-  const auto result = run_silently(settings);
+  const auto result = run_silently(run_layout_study, settings);
   ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_EQ(result->frames, 3u);
   ASSERT_EQ(result->rows.size(), 9u);
@@ -108,7 +102,7 @@ TEST(LayoutStudy, CodesOneRenderingAtEveryBitRate) {
   settings.layouts = {"coherent"};
   settings.atlases = {{512, 256}};
   settings.bitrates_mbps = {0.5, 4};
-  const auto result = run_silently(settings);
+  const auto result = run_silently(run_layout_study, settings);
   ASSERT_TRUE(result.ok()) << result.status();
   ASSERT_EQ(result->rows.size(), 2u);
   const LayoutRow &low = result->rows[0], &high = result->rows[1];

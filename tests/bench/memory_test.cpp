@@ -5,7 +5,8 @@
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
-#include <sstream>
+
+#include "silent_run.h"
 
 namespace tessera::bench {
 namespace {
@@ -13,9 +14,7 @@ namespace {
 using testing::HasSubstr;
 
 StatusOr<MemoryResult> run(const MemorySettings& settings) {
-  std::ostringstream silent;
-  Progress progress(silent);
-  return run_memory(settings, progress);
+  return run_silently(run_memory, settings);
 }
 
 MemorySettings small_settings() {

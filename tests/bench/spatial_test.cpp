@@ -4,10 +4,10 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "bench/file_io.h"
 #include "bench/temporary_folder.h"
+#include "silent_run.h"
 
 namespace tessera::bench {
 namespace {
@@ -26,9 +26,7 @@ TEST(Spatial, ReuseSavesSamples) {
   settings.common.atlas = {1024, 1024};
   settings.common.seconds = 1;  // one frame
   settings.common.truth_cache = "none";
-  std::ostringstream silent;
-  Progress progress(silent);
-  const auto result = run_spatial(settings, progress);
+  const auto result = run_silently(run_spatial, settings);
   ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_EQ(result->frames, 1u);
   EXPECT_EQ(result->rows.size(), spatial_cases().size());

@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include <sstream>
-
+#include "../bench/silent_run.h"
 #include "bench/result.h"
 
 namespace tessera::bench {
@@ -25,9 +24,7 @@ LoopbackSettings small(double seconds) {
 }
 
 LoopbackResult run(const LoopbackSettings& settings) {
-  std::ostringstream silent;
-  Progress progress(silent);
-  auto result = run_loopback(settings, progress);
+  auto result = run_silently(run_loopback, settings);
   EXPECT_TRUE(result.ok()) << result.status();
   return *std::move(result);
 }
@@ -113,9 +110,7 @@ TEST(Loopback, RawHasNoCodingError) {
 TEST(Loopback, AMissingSceneNamesTheFile) {
   LoopbackSettings s = small(0.1);
   s.scene = "no/such/scene.glb";
-  std::ostringstream silent;
-  Progress progress(silent);
-  const auto result = run_loopback(s, progress);
+  const auto result = run_silently(run_loopback, s);
   ASSERT_FALSE(result.ok());
   EXPECT_NE(std::string(result.status().message()).find("no/such/scene.glb"), std::string::npos);
 }

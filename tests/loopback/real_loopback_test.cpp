@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <set>
-#include <sstream>
 
+#include "../bench/silent_run.h"
 #include "base/frame_trace.h"
 #include "bench/file_io.h"
 #include "bench/loopback.h"
@@ -23,9 +23,7 @@ StatusOr<LoopbackResult> run(LoopbackSettings s, double server_fps = 10, double 
   s.atlas = {512, 256};
   s.score_every = 10;
   s.validation = true;
-  std::ostringstream silent;
-  Progress progress(silent);
-  return run_loopback(s, progress);
+  return run_silently(run_loopback, s);
 }
 
 TEST(RealLoopback, EveryFramesDurationsTileItsTime) {
@@ -79,9 +77,7 @@ TEST(RealLoopback, PicturesAreThoseOfTheVirtualClock) {
   s.truth_cache = "none";
   s.score_every = 1;
   s.seconds = 4;
-  std::ostringstream silent;
-  Progress progress(silent);
-  const auto virtual_run = run_loopback(s, progress);
+  const auto virtual_run = run_silently(run_loopback, s);
   ASSERT_TRUE(virtual_run.ok()) << virtual_run.status();
   // The daemon counts frames from 1, virtual time from 0.
   std::map<FrameNumber, double> of_frame;
