@@ -6,9 +6,9 @@
 namespace tessera::atlas::coherent {
 namespace {
 
-// Widths of slabs: few enough to share slabs, close enough that the shape is off by a fifth at most. Their
-// edges lie where those of the squares lie that video transforms as a unit, but for the smallest.
-constexpr uint16_t kWidths[] = {2, 4, 6, 8, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192, 256};
+// Widths of slabs: few enough to share slabs, close enough that the shape is off by a fifth at most, or a
+// third where they are small. Whole squares but for the smallest.
+constexpr uint16_t kWidths[] = {2, 4, 8, 12, 16, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192, 256};
 
 constexpr float kMostExcess = 1.25f;  // of height, for a width that is too small
 
@@ -27,9 +27,20 @@ struct WidthTable {
 };
 constexpr WidthTable kWidthTable;
 
+uint16_t multiple_near(float texels, uint32_t step, uint32_t most) {
+  const float steps = texels / static_cast<float>(step) + 0.5f;
+  const uint32_t most_steps = most / step;
+  return static_cast<uint16_t>(step * static_cast<uint32_t>(std::clamp(steps, 1.0f, float(most_steps))));
+}
+
 uint16_t even(float texels, uint32_t most) {
-  const float half = std::clamp(0.5f * texels + 0.5f, 1.0f, 0.5f * static_cast<float>(most));
-  return static_cast<uint16_t>(2 * static_cast<uint32_t>(half));
+  return multiple_near(texels, 2, most);
+}
+
+// Even up to a square, then halves of squares up to two, then whole ones.
+uint16_t height_near(float texels, uint32_t most) {
+  if (texels < kSquare + 1 || most < kSquare) return even(texels, most);
+  return multiple_near(texels, texels < 2 * kSquare ? kSquare / 2 : kSquare, most);
 }
 
 // The widest that is no wider.
@@ -41,8 +52,13 @@ uint16_t next_width(uint16_t width) {
   return *std::ranges::upper_bound(kWidths, width);
 }
 
-// Before the size is held back by that of the last frame.
-RectangleSize wish(const RectangleNeed& need, bool masked, float scale, const MostSides& most) {
+// In texels along the patch's axes, before it is held back by that of the last frame.
+struct Wish {
+  RectangleSize size;
+  float u, v;  // what was rounded to it
+};
+
+Wish wish(const RectangleNeed& need, bool masked, float scale, const MostSides& most) {
   const uint16_t widest = width_within(masked ? std::max(most.width / 2, 2) : most.width);
   const uint32_t highest = masked ? std::max(most.height / 4 * 2, 2) : most.height;
   const bool u_is_long = need.u >= need.v;
@@ -53,23 +69,26 @@ RectangleSize wish(const RectangleNeed& need, bool masked, float scale, const Mo
   const float length = scale * (u_is_long ? need.u : need.v) * across / height_intervals;
   // The height makes up for the width's rounding, so that the area stays.
   const auto height_at = [&](uint16_t width) {
-    return even(height_intervals * std::min(length / static_cast<float>(width - 1), kMostExcess) + 1,
-                highest);
+    return height_near(height_intervals * std::min(length / static_cast<float>(width - 1), kMostExcess) + 1,
+                       highest);
   };
   uint16_t width = std::min(kWidthTable.nearest[even(length + 1, kShelfHeight) / 2], widest);
   // Nearly a square, which is best cut off a little; or one of the next width.
   if (width < widest && 2 * height_at(width) > width + next_width(width)) width = next_width(width);
   const uint16_t height = std::min(height_at(width), width);
-  return u_is_long ? RectangleSize{width, height} : RectangleSize{height, width};
+  const float exact_width = std::min(length + 1, static_cast<float>(widest));
+  const float exact_height = std::min(height_intervals + 1, static_cast<float>(highest));
+  if (u_is_long) return {{width, height}, exact_width, exact_height};
+  return {{height, width}, exact_height, exact_width};
 }
 
 // Neither side may have much fewer samples than wished, which shows; both together not many more, which costs
 // others theirs. Wide bounds: what is placed anew costs bits.
-bool still_fits(const RectangleSize& held, const RectangleSize& wished) {
+bool still_fits(const RectangleSize& held, const Wish& wished) {
   constexpr float kSparsest = 0.7f, kDensest = 2.5f;
   const auto enough = [](float has, float wish) { return has >= std::min(kSparsest * wish, wish - 2); };
   return enough(held.u, wished.u) && enough(held.v, wished.v) &&
-         static_cast<float>(held.u * held.v) <= kDensest * static_cast<float>(wished.u * wished.v);
+         static_cast<float>(held.u * held.v) <= kDensest * wished.u * wished.v;
 }
 
 bool is_color(const RectangleNeed& need, bool masked, float color_area) {
@@ -100,9 +119,9 @@ RectangleSize select_size(const RectangleNeed& need, bool masked, float bias, co
   if (previous)
     color_area *= std::exp2(previous->single_color() ? settings.hysteresis : -settings.hysteresis);
   if (is_color(need, masked, color_area)) return {};
-  const RectangleSize size = wish(need, masked, std::exp2(-0.5f * bias), most);
-  const bool stays = previous && !previous->single_color() && still_fits(*previous, size);
-  return stays ? *previous : size;
+  const Wish wished = wish(need, masked, std::exp2(-0.5f * bias), most);
+  const bool stays = previous && !previous->single_color() && still_fits(*previous, wished);
+  return stays ? *previous : wished.size;
 }
 
 uvec2 sides_of(const RectangleSize& size, bool masked) {
@@ -120,7 +139,7 @@ float select_bias(std::span<const Wanted> wanted, double target_texels, const Le
     uint64_t sum = 0;
     for (const Wanted& w : wanted)
       if (!is_color(w.need, w.masked, color_area))
-        sum += texels(wish(w.need, w.masked, scale, most), w.masked);
+        sum += texels(wish(w.need, w.masked, scale, most).size, w.masked);
     return static_cast<double>(sum) <= target_texels;
   };
   return least_bias(settings, fits, near);

@@ -18,7 +18,30 @@ int lowest_bit(Bits bits) {
   return low ? std::countr_zero(low) : 64 + std::countr_zero(static_cast<uint64_t>(bits >> 64));
 }
 
-// Index of the first run of `length` ones, or -1.
+int highest_bit(Bits bits) {
+  const auto high = static_cast<uint64_t>(bits >> 64);
+  return high ? 127 - std::countl_zero(high) : 63 - std::countl_zero(static_cast<uint64_t>(bits));
+}
+
+constexpr uint32_t kSquareUnits = kSquare / kUnit;
+
+// Of what a side starts at multiples of: as its own length, at most a square. All in units.
+uint32_t step_of(uint32_t side) {
+  return std::min(side & -side, kSquareUnits);
+}
+
+bool is_square_wise(uint32_t side) {
+  return side % kSquareUnits == 0;
+}
+
+// A bit at each multiple of `step`, a power of two.
+Bits multiples_of(uint32_t step) {
+  Bits bits = 1;
+  for (uint32_t have = step; have < 128; have *= 2) bits |= bits << have;
+  return bits;
+}
+
+// Where a run of `length` ones starts, or -1: the lowest if that is whole squares, else the highest.
 int find_run(Bits bits, uint32_t length) {
   // After each step a bit stands for a run of `have` ones that starts there.
   for (uint32_t have = 1; have < length && bits;) {
@@ -26,7 +49,35 @@ int find_run(Bits bits, uint32_t length) {
     bits &= bits >> step;
     have += step;
   }
-  return bits ? lowest_bit(bits) : -1;
+  bits &= multiples_of(step_of(length));
+  if (!bits) return -1;
+  return is_square_wise(length) ? lowest_bit(bits) : highest_bit(bits);
+}
+
+// Where so many zeros start, at a multiple of their step.
+std::optional<uint32_t> first_gap(const std::vector<uint8_t>& taken, uint32_t length) {
+  const uint32_t step = step_of(length);
+  const auto begin = taken.begin();
+  for (uint32_t at = 0; at + length <= taken.size();) {
+    const auto from = std::make_reverse_iterator(begin + at + length),
+               to = std::make_reverse_iterator(begin + at);
+    const auto in_the_way = std::find(from, to, 1);
+    if (in_the_way == to) return at;
+    at = (static_cast<uint32_t>(in_the_way.base() - begin) + step - 1) / step * step;
+  }
+  return std::nullopt;
+}
+
+std::optional<uint32_t> last_gap(const std::vector<uint8_t>& taken, uint32_t length) {
+  const uint32_t step = step_of(length);
+  const auto begin = taken.begin();
+  for (auto end = static_cast<uint32_t>(taken.size()); end >= length;) {
+    const uint32_t at = (end - length) / step * step;
+    const auto in_the_way = std::find(begin + at, begin + at + length, 1);
+    if (in_the_way == begin + at + length) return at;
+    end = static_cast<uint32_t>(in_the_way - begin);
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -78,25 +129,11 @@ std::optional<uvec2> Slabs::find(uint32_t width, uint32_t rows, bool may_draw) {
   return std::nullopt;
 }
 
-std::optional<uint32_t> Slabs::gap_in(const Shelf& shelf, uint32_t width) {
-  const auto& taken = shelf.taken;
-  if (width % 2 != 0) {
-    const auto gap = std::search_n(taken.rbegin(), taken.rend(), width, 0);
-    if (gap == taken.rend()) return std::nullopt;
-    return static_cast<uint32_t>(taken.rend() - gap) - width;
-  }
-  for (auto gap = taken.begin();; ++gap) {
-    gap = std::search_n(gap, taken.end(), width, 0);
-    if (gap == taken.end()) return std::nullopt;
-    if ((gap - taken.begin()) % 2 == 0) return static_cast<uint32_t>(gap - taken.begin());
-  }
-}
-
 std::optional<uint32_t> Slabs::draw_slab(uint32_t width, uint32_t rows) {
   for (uint32_t s = 0; s < shelves_.size(); ++s) {
     Shelf& shelf = shelves_[s];
     if (shelf.free_units < width || shelf.units < rows) continue;
-    const std::optional<uint32_t> gap = gap_in(shelf, width);
+    const auto gap = is_square_wise(width) ? first_gap(shelf.taken, width) : last_gap(shelf.taken, width);
     if (!gap) continue;
     std::fill_n(shelf.taken.begin() + *gap, width, uint8_t{1});
     shelf.free_units -= width;
@@ -188,7 +225,7 @@ bool Slabs::close_for(uint32_t width, uint32_t height, uint64_t budget_texels) {
     if (shelf.units < height / kUnit) continue;
     for (uint32_t x = 0, next = 0; x + units <= shelf.taken.size(); x = next) {
       next = x + (shelf.taken[x] ? slabs_[shelf.slab_of_x[x]].width : 1);
-      if (units % 2 == 0 && x % 2 != 0) continue;  // see gap_in()
+      if (x % step_of(units) != 0) continue;
       std::vector<uint32_t> within = slabs_within(shelf, x, units);
       uint64_t texels = 0;
       for (const uint32_t index : within) texels += texels_in(slabs_[index]);

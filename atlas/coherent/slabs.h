@@ -5,6 +5,9 @@
 //   slab    as wide as its rectangles (or wider), as high as the shelf; drawn when its width runs out of room
 //   rect    of the slab's width and any even height
 //
+// JPEG and H.264 transform squares of 8 texels, and one that two rectangles share costs bits. So sides of
+// whole squares start where a square does, on the left and at the top; the others stand at the other end.
+//
 // So both dimensions are packed as intervals of a line, where free neighbours merge by themselves: unlike
 // power-of-two blocks on stacks, freed room serves every height, and an empty slab every width.
 #pragma once
@@ -19,6 +22,8 @@
 namespace tessera::atlas::coherent {
 
 constexpr uint32_t kShelfHeight = 256;  // texels; the largest side of a rectangle, too
+constexpr uint32_t kSquare = 8;         // texels
+constexpr uint32_t kUnit = 2;           // texels: all sides and places are multiples
 
 struct SlabStats {
   uint64_t used_texels = 0;      // in rectangles
@@ -34,8 +39,7 @@ class Slabs {
 
   // Upper left texel of a free rectangle, or nothing if there is no room. Sides: even, 2..kShelfHeight. First
   // fit, in the slabs of its width; if it may draw, else in a new slab, or in the narrowest wider one that
-  // has room, up to four times as wide. Slabs of whole multiples of four texels stand on such, the others at
-  // the right end.
+  // has room, up to four times as wide.
   std::optional<uvec2> allocate(uint32_t width, uint32_t height, bool may_draw = true);
   // Gives back what allocate() returned for these sides.
   void free(uvec2 at, uint32_t width, uint32_t height);
@@ -56,8 +60,7 @@ class Slabs {
   float free_share() const;
 
  private:
-  static constexpr uint32_t kUnit = 2;  // texels
-  using Rows = unsigned __int128;       // a bit for each unit of a slab's height; 1 = free
+  using Rows = unsigned __int128;  // a bit for each unit of a slab's height; 1 = free
 
   struct Slab {
     uint16_t x = 0, width = 0, shelf = 0;  // x, width in units
@@ -81,8 +84,6 @@ class Slabs {
   std::optional<uvec2> take(uint32_t slab, uint32_t rows);
   std::optional<uvec2> take_from_width(uint32_t width, uint32_t rows);
   std::optional<uint32_t> draw_slab(uint32_t width, uint32_t rows);
-  // Where a slab of this width can stand, in units; any two of which are four texels.
-  static std::optional<uint32_t> gap_in(const Shelf& shelf, uint32_t width);
   void release(uint32_t slab);
 
   std::vector<Shelf> shelves_;
