@@ -8,19 +8,23 @@ namespace {
 
 // Widths of slabs: few enough to share slabs, close enough that the shape is off by a fifth at most, or a
 // third where they are small. Whole squares but for the smallest.
-constexpr uint16_t kWidths[] = {2, 4, 8, 12, 16, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192, 256};
+constexpr uint16_t kWidths[] = {2, 4, 6, 8, 12, 16, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192, 256};
 
 constexpr float kMostExcess = 1.25f;  // of height, for a width that is too small
 
+// What is held: neither side may have much fewer samples than wished, which shows; both together not many
+// more, which costs others theirs. Wide bounds: what is placed anew costs bits.
+constexpr float kSparsest = 0.7f, kDensest = 2.5f;
+
 struct WidthTable {
-  // By half the wish, rounded.
-  std::array<uint16_t, kShelfHeight / 2 + 1> nearest{};
+  // By the wish in whole texels; of two at the same distance the wider.
+  std::array<uint16_t, kShelfHeight + 1> nearest{};
   constexpr WidthTable() {
-    for (size_t i = 0; i < nearest.size(); ++i) {
-      nearest[i] = kWidths[0];
+    for (size_t wish = 0; wish < nearest.size(); ++wish) {
+      nearest[wish] = kWidths[0];
       for (const uint16_t width : kWidths) {
-        const auto distance = [&](uint16_t w) { return w > 2 * i ? w - 2 * i : 2 * i - w; };
-        if (distance(width) < distance(nearest[i])) nearest[i] = width;
+        const auto distance = [&](uint16_t w) { return w > wish ? w - wish : wish - w; };
+        if (distance(width) <= distance(nearest[wish])) nearest[wish] = width;
       }
     }
   }
@@ -55,7 +59,7 @@ uint16_t next_width(uint16_t width) {
 // In texels along the patch's axes, before it is held back by that of the last frame.
 struct Wish {
   RectangleSize size;
-  float u, v;  // what was rounded to it
+  float u, v;  // what was rounded to it; no more than it may stand for
 };
 
 Wish wish(const RectangleNeed& need, bool masked, float scale, const MostSides& most) {
@@ -72,20 +76,24 @@ Wish wish(const RectangleNeed& need, bool masked, float scale, const MostSides& 
     return height_near(height_intervals * std::min(length / static_cast<float>(width - 1), kMostExcess) + 1,
                        highest);
   };
-  uint16_t width = std::min(kWidthTable.nearest[even(length + 1, kShelfHeight) / 2], widest);
-  // Nearly a square, which is best cut off a little; or one of the next width.
-  if (width < widest && 2 * height_at(width) > width + next_width(width)) width = next_width(width);
-  const uint16_t height = std::min(height_at(width), width);
-  const float exact_width = std::min(length + 1, static_cast<float>(widest));
-  const float exact_height = std::min(height_intervals + 1, static_cast<float>(highest));
+  uint16_t width = std::min(kWidthTable.nearest[multiple_near(length + 1, 1, kShelfHeight)], widest);
+  uint16_t height = height_at(width);
+  if (height > width) {
+    // Nearly a square: one of the next width if that has no fewer samples where it has fewest, else cut off.
+    const uint16_t wider = width < widest ? next_width(width) : width;
+    const uint16_t flatter = std::min(height_at(wider), wider);
+    const bool better =
+        static_cast<float>(flatter - 1) * length >= static_cast<float>(width - 1) * height_intervals;
+    height = better ? flatter : width;
+    width = better ? wider : width;
+  }
+  const float exact_width = std::min(length + 1, static_cast<float>(width) / kSparsest);
+  const float exact_height = std::min(height_intervals + 1, static_cast<float>(height) / kSparsest);
   if (u_is_long) return {{width, height}, exact_width, exact_height};
   return {{height, width}, exact_height, exact_width};
 }
 
-// Neither side may have much fewer samples than wished, which shows; both together not many more, which costs
-// others theirs. Wide bounds: what is placed anew costs bits.
 bool still_fits(const RectangleSize& held, const Wish& wished) {
-  constexpr float kSparsest = 0.7f, kDensest = 2.5f;
   const auto enough = [](float has, float wish) { return has >= std::min(kSparsest * wish, wish - 2); };
   return enough(held.u, wished.u) && enough(held.v, wished.v) &&
          static_cast<float>(held.u * held.v) <= kDensest * wished.u * wished.v;

@@ -34,14 +34,14 @@ bool is_square_wise(uint32_t side) {
   return side % kSquareUnits == 0;
 }
 
-// A bit at each multiple of `step`, a power of two.
-Bits multiples_of(uint32_t step) {
-  Bits bits = 1;
-  for (uint32_t have = step; have < 128; have *= 2) bits |= bits << have;
-  return bits;
+// A bit at each multiple of a step.
+constexpr Bits multiples_of(uint32_t step) {
+  constexpr auto twice = [](uint64_t half) { return Bits{half} << 64 | half; };
+  return step == 1 ? ~Bits{0} : step == 2 ? twice(0x5555555555555555) : twice(0x1111111111111111);
 }
 
-// Where a run of `length` ones starts, or -1: the lowest if that is whole squares, else the highest.
+// Where a run of `length` ones starts, at a multiple of its step, or -1: the lowest if it is whole squares,
+// else the highest.
 int find_run(Bits bits, uint32_t length) {
   // After each step a bit stands for a run of `have` ones that starts there.
   for (uint32_t have = 1; have < length && bits;) {
@@ -148,7 +148,7 @@ std::optional<uint32_t> Slabs::draw_slab(uint32_t width, uint32_t rows) {
                      .width = static_cast<uint16_t>(width),
                      .shelf = static_cast<uint16_t>(s),
                      .free_rows = low_bits(shelf.units)};
-    shelf.slab_of_x[x] = index;
+    std::fill_n(shelf.slab_of_x.begin() + x, width, index);
     by_width_[width].push_back(index);
     return index;
   }
@@ -211,8 +211,12 @@ bool Slabs::close_emptiest(uint64_t budget_texels, float fullest) {
 std::vector<uint32_t> Slabs::slabs_within(const Shelf& shelf, uint32_t x, uint32_t width) const {
   std::vector<uint32_t> within;
   for (uint32_t at = x; at < x + width;) {
-    if (shelf.taken[at]) within.push_back(shelf.slab_of_x[at]);
-    at += shelf.taken[at] ? slabs_[within.back()].width : 1;
+    if (!shelf.taken[at]) {
+      ++at;
+      continue;
+    }
+    within.push_back(shelf.slab_of_x[at]);
+    at = slabs_[within.back()].x + slabs_[within.back()].width;
   }
   return within;
 }
@@ -223,9 +227,7 @@ bool Slabs::close_for(uint32_t width, uint32_t height, uint64_t budget_texels) {
   uint64_t least = budget_texels + 1;
   for (const Shelf& shelf : shelves_) {
     if (shelf.units < height / kUnit) continue;
-    for (uint32_t x = 0, next = 0; x + units <= shelf.taken.size(); x = next) {
-      next = x + (shelf.taken[x] ? slabs_[shelf.slab_of_x[x]].width : 1);
-      if (x % step_of(units) != 0) continue;
+    for (uint32_t x = 0; x + units <= shelf.taken.size(); x += step_of(units)) {
       std::vector<uint32_t> within = slabs_within(shelf, x, units);
       uint64_t texels = 0;
       for (const uint32_t index : within) texels += texels_in(slabs_[index]);

@@ -5,11 +5,12 @@
 //   slab    as wide as its rectangles (or wider), as high as the shelf; drawn when its width runs out of room
 //   rect    of the slab's width and any even height
 //
-// JPEG and H.264 transform squares of 8 texels, and one that two rectangles share costs bits. So sides of
-// whole squares start where a square does, on the left and at the top; the others stand at the other end.
-//
 // So both dimensions are packed as intervals of a line, where free neighbours merge by themselves: unlike
 // power-of-two blocks on stacks, freed room serves every height, and an empty slab every width.
+//
+// JPEG and H.264 transform squares of 8 texels, and one that two rectangles share costs bits. So slabs whose
+// widths are whole squares stand on squares, from the left, and rectangles of such heights from the top; the
+// others stand on halves or quarters of squares, from the other end.
 #pragma once
 
 #include <array>
@@ -37,9 +38,9 @@ class Slabs {
   // Sides of the atlas: even, at most 8192.
   Slabs(uint32_t width, uint32_t height);
 
-  // Upper left texel of a free rectangle, or nothing if there is no room. Sides: even, 2..kShelfHeight. First
-  // fit, in the slabs of its width; if it may draw, else in a new slab, or in the narrowest wider one that
-  // has room, up to four times as wide.
+  // Upper left texel of a free rectangle, or nothing if there is no room. Sides: even, 2..kShelfHeight. In
+  // the first slab of its width that has room; if it may draw, else in a new slab, or in the narrowest wider
+  // one that has room, up to four times as wide.
   std::optional<uvec2> allocate(uint32_t width, uint32_t height, bool may_draw = true);
   // Gives back what allocate() returned for these sides.
   void free(uvec2 at, uint32_t width, uint32_t height);
@@ -72,13 +73,13 @@ class Slabs {
     uint32_t units = 0;               // of height
     uint32_t free_units = 0;          // of width
     std::vector<uint8_t> taken;       // a unit of width
-    std::vector<uint32_t> slab_of_x;  // by the slab's first unit
+    std::vector<uint32_t> slab_of_x;  // where one is taken
   };
 
   const Slab& slab_at(uvec2 at) const { return slabs_[index_at(at)]; }
   uint32_t index_at(uvec2 at) const { return shelves_[at.y / kShelfHeight].slab_of_x[at.x / kUnit]; }
   uint64_t texels_in(const Slab& slab) const { return uint64_t{slab.used} * slab.width * kUnit * kUnit; }
-  // The slabs of a shelf that stand in `width` units from `x` on, where a slab or a free unit begins.
+  // The slabs of a shelf that stand in any of `width` units from `x` on.
   std::vector<uint32_t> slabs_within(const Shelf& shelf, uint32_t x, uint32_t width) const;
   std::optional<uvec2> find(uint32_t width, uint32_t rows, bool may_draw);
   std::optional<uvec2> take(uint32_t slab, uint32_t rows);

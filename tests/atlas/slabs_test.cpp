@@ -122,6 +122,19 @@ TEST(Slabs, RoomIsMadeOnlyWhereItIsHighEnough) {
   EXPECT_TRUE(slabs.closed(high));
 }
 
+TEST(Slabs, WholeSquaresComeFromTheLeftAndTheTopAndTheRestFromTheOtherEnds) {
+  Slabs slabs(64, 256);
+  EXPECT_EQ(slabs.allocate(8, 16), uvec2(0, 0));
+  EXPECT_EQ(slabs.allocate(8, 4), uvec2(0, 252));
+  EXPECT_EQ(slabs.allocate(8, 2), uvec2(0, 250));
+  EXPECT_EQ(slabs.allocate(8, 12), uvec2(0, 236)) << "at a multiple of four";
+  EXPECT_EQ(slabs.allocate(8, 8), uvec2(0, 16));
+  EXPECT_EQ(slabs.allocate(12, 8), uvec2(52, 0));
+  EXPECT_EQ(slabs.allocate(2, 8), uvec2(50, 0));
+  EXPECT_EQ(slabs.allocate(4, 8), uvec2(44, 0)) << "at a multiple of four";
+  EXPECT_EQ(slabs.allocate(16, 8), uvec2(8, 0));
+}
+
 // Whatever else comes and goes.
 TEST(Slabs, WholeSquaresStandOnSquares) {
   std::mt19937 random(11);
@@ -148,6 +161,22 @@ TEST(Slabs, WholeSquaresStandOnSquares) {
   }
   EXPECT_GT(of, 1000);
   EXPECT_GE(on_grid, 9 * of / 10) << "but for those in slabs of other widths";
+}
+
+// A square's place may begin within a slab.
+TEST(Slabs, RoomIsMadeWhereSlabsStandOffSquares) {
+  for (const size_t emptier : {0u, 1u, 2u, 3u, 4u}) {
+    Slabs slabs(64, 256);
+    std::vector<uvec2> at;
+    for (int i = 0; i < 5; ++i) at.push_back(*slabs.allocate(12, 256));
+    slabs.free(at[emptier], 12, 256);
+    at[emptier] = *slabs.allocate(12, 16);
+    ASSERT_FALSE(slabs.allocate(8, 256).has_value());
+    ASSERT_TRUE(slabs.close_for(8, 256, 12 * 16)) << at[emptier].x;
+    for (size_t i = 0; i < at.size(); ++i) EXPECT_EQ(slabs.closed(at[i]), i == emptier) << emptier;
+    slabs.free(at[emptier], 12, 16);
+    EXPECT_TRUE(slabs.allocate(8, 256).has_value()) << emptier;
+  }
 }
 
 TEST(Slabs, RoomIsMadeWhereItIsCheapest) {
