@@ -37,13 +37,9 @@ uint16_t multiple_near(float texels, uint32_t step, uint32_t most) {
   return static_cast<uint16_t>(step * static_cast<uint32_t>(std::clamp(steps, 1.0f, float(most_steps))));
 }
 
-uint16_t even(float texels, uint32_t most) {
-  return multiple_near(texels, 2, most);
-}
-
 // Even up to a square, then halves of squares up to two, then whole ones.
 uint16_t height_near(float texels, uint32_t most) {
-  if (texels < kSquare + 1 || most < kSquare) return even(texels, most);
+  if (texels < kSquare + 1 || most < kSquare) return multiple_near(texels, 2, most);
   return multiple_near(texels, texels < 2 * kSquare ? kSquare / 2 : kSquare, most);
 }
 
@@ -82,10 +78,12 @@ Wish wish(const RectangleNeed& need, bool masked, float scale, const MostSides& 
     // Nearly a square: one of the next width if that has no fewer samples where it has fewest, else cut off.
     const uint16_t wider = width < widest ? next_width(width) : width;
     const uint16_t flatter = std::min(height_at(wider), wider);
-    const bool better =
-        static_cast<float>(flatter - 1) * length >= static_cast<float>(width - 1) * height_intervals;
-    height = better ? flatter : width;
-    width = better ? wider : width;
+    if (static_cast<float>(flatter - 1) * length >= static_cast<float>(width - 1) * height_intervals) {
+      width = wider;
+      height = flatter;
+    } else {
+      height = width;
+    }
   }
   const float exact_width = std::min(length + 1, static_cast<float>(width) / kSparsest);
   const float exact_height = std::min(height_intervals + 1, static_cast<float>(height) / kSparsest);
