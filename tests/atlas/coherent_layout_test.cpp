@@ -298,11 +298,12 @@ TEST(Rectangles, SamplesAreEquallyDenseWhateverTheShape) {
       const RectangleSize size = select_size(need, false, 0, nullptr, {});
       // Intervals a pixel, both ways together.
       const float density = float(size.u - 1) * float(size.v - 1) / (u * v);
-      const bool small = std::min(u, v) < 8;
+      const float least = std::min(u, v);
       const auto what = [&] { return absl::StrCat(u, "x", v, ": ", size.u, "x", size.v); };
-      EXPECT_NEAR(std::log2(density), 0, small ? 0.49f : 0.42f) << what();
+      EXPECT_NEAR(std::log2(density), 0, least < 8 ? 0.49f : 0.42f) << what();
+      const float side_bound = least < 8 ? 0.73f : least < 24 ? 0.66f : 0.42f;
       for (const auto& [has, wish] : {std::pair(size.u, u), std::pair(size.v, v)})
-        EXPECT_NEAR(std::log2(float(has - 1) / wish), 0, small ? 0.73f : 0.66f) << what();
+        EXPECT_NEAR(std::log2(float(has - 1) / wish), 0, side_bound) << what();
     }
   }
 }
