@@ -15,7 +15,7 @@ namespace {
 // Aimed at a little below the budget; what is above it, or below this share, is worth another try. Between
 // them lies what the sample errs by from picture to picture, a few percent: another try costs as much time as
 // the first.
-constexpr double kAim = 0.955, kGoodShare = 0.9;
+constexpr double kAim = 0.975, kGoodShare = 0.92;
 constexpr int kTries = 3, kMostTries = 8;  // with the whole picture: while one fits already; while none does
 constexpr int kPlanTries = 6;              // with its sample, whose size
 constexpr double kFar = 0.08;              // off by more than this tells too little of the right scale

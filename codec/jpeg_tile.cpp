@@ -17,6 +17,10 @@ namespace {
 
 constexpr int kMcuRows = 16;  // lines of luma that libjpeg takes at a time
 
+// Annex K's chroma steps grow from 17 to 99, for eyes that see fine colours badly. At half of luma's
+// resolution one for all is nearer to the truth at equal bits, in luma and in RGB (docs/layouts.md).
+constexpr uint16_t kChromaQuantiser = 48;
+
 // libjpeg reports errors by a callback that must not return. This one jumps back to where `jump` was set; no
 // object with a destructor may be made in between.
 struct Errors {
@@ -71,7 +75,7 @@ struct JpegCompressor::Impl {
   Errors errors;
   jpeg_destination_mgr destination{};
   std::vector<uint8_t> buffer;
-  std::array<std::array<uint16_t, DCTSIZE2>, 2> annex_k{};  // quantisers of luma and chroma
+  std::array<std::array<uint16_t, DCTSIZE2>, 2> quantisers{};  // of luma and chroma, at a scale of 1
   bool ready = false;
 
   Impl() { ready = set_up(); }
@@ -104,8 +108,8 @@ bool JpegCompressor::Impl::set_up() {
   codec.in_color_space = JCS_YCbCr;
   jpeg_set_defaults(&codec);
   jpeg_set_linear_quality(&codec, 100, TRUE);
-  for (size_t table = 0; table < annex_k.size(); ++table)
-    std::copy_n(codec.quant_tbl_ptrs[table]->quantval, DCTSIZE2, annex_k[table].begin());
+  std::copy_n(codec.quant_tbl_ptrs[0]->quantval, DCTSIZE2, quantisers[0].begin());
+  quantisers[1].fill(kChromaQuantiser);
   // JFIF promises BT.601 colours of full range; these are not (base/yuv.h).
   codec.write_JFIF_header = FALSE;
   codec.raw_data_in = TRUE;
@@ -114,10 +118,10 @@ bool JpegCompressor::Impl::set_up() {
 
 void JpegCompressor::Impl::set_scale(double scale) {
   for (int table = 0; table < 2; ++table) {
-    unsigned int quantisers[DCTSIZE2];
+    unsigned int scaled[DCTSIZE2];
     for (int i = 0; i < DCTSIZE2; ++i)
-      quantisers[i] = static_cast<unsigned int>(std::clamp(scale * annex_k[table][i] + 0.5, 1.0, 255.0));
-    jpeg_add_quant_table(&codec, table, quantisers, 100, TRUE);
+      scaled[i] = static_cast<unsigned int>(std::clamp(scale * quantisers[table][i] + 0.5, 1.0, 255.0));
+    jpeg_add_quant_table(&codec, table, scaled, 100, TRUE);
   }
 }
 

@@ -13,7 +13,8 @@
 
 namespace tessera::codec {
 
-// Quantisers are those of the standard's annex K times a scale: 1 is libjpeg's quality 50.
+// Luma's quantisers are those of the standard's annex K times a scale (1 is libjpeg's quality 50), chroma's
+// are all alike.
 constexpr double kFinestScale = 0.1, kCoarsestScale = 20;
 
 // Not thread-safe; one for each thread.
