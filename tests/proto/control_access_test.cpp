@@ -54,7 +54,7 @@ TEST_F(ControlToken, WhatIsNoTokenIsRefusedAndNotShown) {
   using std::string_literals::operator""s;
   for (const std::string& text :
        {""s, "\n"s, "secret789abcdef"s, "\nsecret6789abcdef"s, "secret 789abcdefg"s, "secret6789abcdef\r\n"s,
-        "secret6789abcdef\0\n"s, "secret6789abcdef\xc3\xa4"s, "secret"s + std::string(1019, 'x')}) {
+        "secret6789abcdef\0\n"s, "secret6789abcdef\xc3\xa4"s, std::string("secret").append(1019, 'x')}) {
     write(text);
     EXPECT_THAT(refusal(), AllOf(HasSubstr("16"), HasSubstr("openssl rand"), Not(HasSubstr("secret"))))
         << testing::PrintToString(text);
