@@ -4,6 +4,13 @@
 
 namespace tessera::pvs {
 
+DurationNs Retention::time_of(const scene::Footprint& footprint) const {
+  const double area = footprint.area_px2;
+  const bool is_small = area * kMostSeconds <= kKeptPx2Seconds;  // false for NaN
+  const double seconds = is_small ? kMostSeconds : kKeptPx2Seconds / area;
+  return seconds > 0 ? std::max(keep_ns_, from_seconds(seconds)) : keep_ns_;
+}
+
 scene::VisiblePatches Retention::update(TimeNs now_ns, const scene::VisiblePatches& seen) {
   std::vector<Entry> merged;
   merged.reserve(std::max(seen.size(), entries_.size()));
@@ -12,7 +19,7 @@ scene::VisiblePatches Retention::update(TimeNs now_ns, const scene::VisiblePatch
     for (; old != entries_.end() && old->patch.patch < patch; ++old) {
       // A clock that jumped back restarts the wait, so that nothing stays for ever.
       const TimeNs last_seen = std::min(old->last_seen_ns, now_ns);
-      if (now_ns - last_seen <= keep_ns_) merged.push_back({old->patch, last_seen});
+      if (now_ns - last_seen <= time_of(old->patch.footprint)) merged.push_back({old->patch, last_seen});
     }
   };
   for (const scene::VisiblePatch& patch : seen) {
