@@ -122,12 +122,7 @@ BlockNeed block_need(const scene::Footprint& footprint, const PatchTraits& trait
   BlockNeed need{.upright = v > u};
   // Edges that vanish together have no direction.
   if (u > 0 || v > 0) need.elongation = std::min(std::max(u, v) / std::min(u, v), kMaxElongation);
-  const float length = std::sqrt(area * need.elongation);
-  // A block is at least 2 texels high. A sliver is granted them, or its length would pay for its height; up
-  // to four times its area, since below half a pixel of height little of its detail reaches the screen. No
-  // grant to patches that are small both ways.
-  const float granted = std::min(std::min(4 * area, 2 * length), 0.5f * length * area);
-  need.area = (traits.masked ? 2.0f : 1.0f) * std::max(area, granted);
+  need.area = (traits.masked ? 2.0f : 1.0f) * area;
   return need;
 }
 

@@ -28,7 +28,7 @@ Spacing spacing_for(const scene::Geometry& geometry, const scene::Patch& patch, 
 }
 
 bool still_good(const Spacing& held, const Spacing& wanted) {
-  constexpr int kTolerance = 5;  // codes: a sixth of distance
+  constexpr int kTolerance = 21;  // codes: an octave
   for (size_t i = 0; i < held.size(); ++i)
     if (std::abs(held[i] - wanted[i]) > kTolerance) return false;
   return true;

@@ -241,7 +241,7 @@ TEST_F(CoherentLayout, SpacingIsFrozenWhileItIsGood) {
   const Placement before = mirror_.at(0);
   EXPECT_GT(before.spacing[1], 0) << "the far edge is farther";
   EXPECT_TRUE(update(visible, {0.5, 0.3, 3.1}).changed.empty());
-  const LayoutDelta delta = update(visible, {0.5, 0.3, 0.2});
+  const LayoutDelta delta = update(visible, {0.05, 0.05, 0.05});
   EXPECT_FALSE(delta.changed.empty());
   const Placement after = mirror_.at(0);
   EXPECT_NE(after.spacing, before.spacing);
@@ -432,6 +432,19 @@ TEST(Spacing, DistancesAreOnAScaleOfOctaves) {
   EXPECT_EQ(spacing_for(g, g.patches[0], dmat4(1), {0, 0, 0}), Spacing{});
   const dmat4 nan(std::numeric_limits<double>::quiet_NaN());
   EXPECT_EQ(spacing_for(g, g.patches[0], nan, {0, 0, 1}), Spacing{});
+}
+
+TEST(Spacing, IsGoodWithinAnOctave) {
+  const Spacing held{0, 10, -10, 126};
+  for (size_t corner = 0; corner < held.size(); ++corner) {
+    for (const int off : {-22, -21, 21, 22}) {
+      Spacing wanted = held;
+      const int code = held[corner] + off;
+      if (code > 126) continue;
+      wanted[corner] = static_cast<SpacingCode>(code);
+      EXPECT_EQ(still_good(held, wanted), std::abs(off) <= 21) << corner << " off by " << off;
+    }
+  }
 }
 
 }  // namespace

@@ -101,14 +101,18 @@ TEST(LevelSelection, BlocksMatchFootprintsInBothAxes) {
   }
 }
 
-TEST(LevelSelection, SliversKeepTheirLength) {
+// They are higher than their footprint by far, and pay for that.
+TEST(LevelSelection, SliversPayForTheirHeightWithTheirLength) {
   for (float u = 8; u <= 120; u *= 1.13f) {
-    for (const float v : {0.5f, 1.0f, 1.9f}) {
+    for (const float v : {0.25f, 0.5f, 1.0f, 1.9f}) {
       const LevelWish wish = select_level(rectangle(u, v), kPair, 0, nullptr, {});
+      EXPECT_FALSE(wish.single_color);
       EXPECT_EQ(wish.level.log_h, kMinLog);
-      EXPECT_NEAR(wish.level.log_w, std::log2(u), 0.7f) << u << " x " << v;
-      EXPECT_FALSE(wish.transposed);
-      EXPECT_TRUE(select_level(rectangle(v, u), kPair, 0, nullptr, {}).transposed);
+      EXPECT_NEAR(wish.level.log_w + wish.level.log_h, std::max(2.0f, std::log2(u * v)), 0.5001f)
+          << u << " x " << v;
+      const LevelWish high = select_level(rectangle(v, u), kPair, 0, nullptr, {});
+      EXPECT_EQ(high.level, wish.level);
+      EXPECT_TRUE(high.transposed || high.level.log_w == kMinLog);
     }
   }
 }
