@@ -55,7 +55,7 @@ struct FrameStats {
   StageTimes times;
   uint32_t predicted_views = 0;
   size_t visible_patches = 0;  // seen in this frame's views
-  size_t placed_patches = 0;   // with those that stay for one round trip
+  size_t placed_patches = 0;   // with those that merely stay
   pvs::VisibilityStats visibility;
   atlas::LayoutStats layout;
   shading::GatherStats gather;
