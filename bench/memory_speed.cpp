@@ -115,15 +115,15 @@ class CpuMemory {
     out_.resize(requests_.size());
     allocator_.update(requests_, out_);
     const TimeNs done = clock_.now();
-    for (size_t i = 0; i < changed_.size(); ++i) {
-      blocks_[changed_[i]] = out_[i];
-      levels_[changed_[i]] = wishes[changed_[i]];
+    for (size_t i = 0; i < changed_count_; ++i) {
+      blocks_[found_[i]] = out_[i];
+      levels_[found_[i]] = wishes[found_[i]];
     }
     return {done - found, clock_.now() - begin};
   }
 
   // Of the last update.
-  std::span<const uint32_t> changed() const { return changed_; }
+  std::span<const uint32_t> changed() const { return std::span(found_).first(changed_count_); }
   std::span<const Request> requests() const { return requests_; }
   std::span<const BlockAddress> assigned() const { return out_; }
 
@@ -135,9 +135,9 @@ class CpuMemory {
       found_[count] = patch;
       count += std::bit_cast<uint16_t>(wishes[patch]) != std::bit_cast<uint16_t>(levels_[patch]) ? 1u : 0u;
     }
-    changed_ = std::span(found_).first(count);
+    changed_count_ = count;
     requests_.clear();
-    for (const uint32_t patch : changed_) {
+    for (const uint32_t patch : changed()) {
       requests_.push_back({.frees = blocks_[patch] != Allocator::kNoBlock,
                            .old_level = levels_[patch],
                            .old_block = blocks_[patch],
@@ -151,8 +151,8 @@ class CpuMemory {
   std::vector<Level> levels_;
   std::vector<BlockAddress> blocks_;
   std::vector<Request> requests_;
-  std::vector<uint32_t> found_;  // as long as all patches; changed_ is its front
-  std::span<const uint32_t> changed_;
+  std::vector<uint32_t> found_;  // as long as all patches
+  size_t changed_count_ = 0;     // the front of found_
   std::vector<BlockAddress> out_;
 };
 

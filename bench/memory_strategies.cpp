@@ -77,14 +77,15 @@ StatusOr<std::vector<StrategyRow>> compare_strategies(gpu::Device& device, const
     rows.push_back({.strategy = strategy});
   }
 
-  pvs::Retention retention(from_ms(2 * settings.delay_ms));
+  pvs::Retention retention;
   progress.begin("path frames", frames);
   for (uint32_t i = 0; i < frames; ++i) {
     const PathViews from = path_views(settings, path, settings.start_s + i / settings.server_fps);
     instant->set(from.newest.time_ns, from.newest.pose.position);
     TESSERA_ASSIGN_OR_RETURN(const scene::VisiblePatches seen,
                              visibility->determine(*instant, from.views, client_view(settings)));
-    const scene::VisiblePatches visible = retention.update(from.newest.time_ns, seen);
+    const scene::VisiblePatches visible =
+        retention.update(from.newest.time_ns, from_ms(2 * settings.delay_ms), seen);
     for (size_t s = 0; s < layouts.size(); ++s) {
       layouts[s]->update({.visible = visible});
       add(*layouts[s], rows[s]);

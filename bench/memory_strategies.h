@@ -33,8 +33,8 @@ struct StrategyRow {
 
 std::string_view name_of(atlas::blocks::Strategy strategy);  // "S0" to "S3"
 
-// The visible sets are those of a session without loss: path_views(), and patches that left stay for a round
-// trip. All strategies get the same ones.
+// The visible sets are those of a session without loss: path_views(), and patches that left stay as there
+// (pvs/retention.h). All strategies get the same ones.
 StatusOr<std::vector<StrategyRow>> compare_strategies(gpu::Device& device, const LoopbackSettings& settings,
                                                       uint32_t frames, Progress& progress);
 

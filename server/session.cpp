@@ -44,7 +44,7 @@ struct Session::Impl {
   FramePlan plan;
   std::unique_ptr<scene::SceneInstant> instant;
   std::unique_ptr<pvs::Visibility> visibility;
-  std::optional<pvs::Retention> retention;
+  pvs::Retention retention;
   std::unique_ptr<atlas::Density> density;  // only where the settings ask for it
   std::unique_ptr<atlas::Layout> layout;
   std::unique_ptr<shading::Gather> gather;
@@ -188,8 +188,7 @@ StatusOr<Frame> Session::render(const FrameInput& input) {
   StageTimes& times = frame.stats.times;
 
   TESSERA_RETURN_IF_ERROR(impl_->find_visible(input, frame.stats));
-  if (!impl_->retention) impl_->retention.emplace(input.round_trip_ns);
-  scene::VisiblePatches kept = impl_->retention->update(frame.pose.time_ns, impl_->seen);
+  scene::VisiblePatches kept = impl_->retention.update(frame.pose.time_ns, input.round_trip_ns, impl_->seen);
   times.visibility_ms = watch.lap_ms();
 
   if (impl_->density) impl_->density->scale(impl_->instant->instance_transforms(), impl_->viewers, kept);

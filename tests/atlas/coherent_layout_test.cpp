@@ -241,6 +241,7 @@ TEST_F(CoherentLayout, SpacingIsFrozenWhileItIsGood) {
   const Placement before = mirror_.at(0);
   EXPECT_GT(before.spacing[1], 0) << "the far edge is farther";
   EXPECT_TRUE(update(visible, {0.5, 0.3, 3.1}).changed.empty());
+  EXPECT_TRUE(update(visible, {0.5, 0.3, 0.2}).changed.empty());
   const LayoutDelta delta = update(visible, {0.05, 0.05, 0.05});
   EXPECT_FALSE(delta.changed.empty());
   const Placement after = mirror_.at(0);

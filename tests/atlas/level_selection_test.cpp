@@ -110,9 +110,14 @@ TEST(LevelSelection, SliversPayForTheirHeightWithTheirLength) {
       EXPECT_EQ(wish.level.log_h, kMinLog);
       EXPECT_NEAR(wish.level.log_w + wish.level.log_h, std::max(2.0f, std::log2(u * v)), 0.5001f)
           << u << " x " << v;
+      EXPECT_FALSE(wish.transposed);
       const LevelWish high = select_level(rectangle(v, u), kPair, 0, nullptr, {});
       EXPECT_EQ(high.level, wish.level);
       EXPECT_TRUE(high.transposed || high.level.log_w == kMinLog);
+      // As of any other patch, its area tells when one colour is enough.
+      const float color_bias = std::log2(u * v / LevelSettings{}.color_area_px2);
+      EXPECT_FALSE(select_level(rectangle(u, v), kPair, color_bias - 0.01f, nullptr, {}).single_color);
+      EXPECT_TRUE(select_level(rectangle(u, v), kPair, color_bias + 0.01f, nullptr, {}).single_color);
     }
   }
 }
