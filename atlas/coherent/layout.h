@@ -10,9 +10,9 @@
 
 namespace tessera::atlas::coherent {
 
-// A rectangle stays while it is good enough, and spacing while each corner is right within a factor of two, so that
-// samples do not swim. What should be larger grows a part of the atlas a frame. When room runs out, the
-// emptiest slabs are emptied into the others, a part of the atlas a frame, too.
+// A rectangle stays while it is good enough, and spacing while each corner is right within a factor of two,
+// so that samples do not swim. What should be larger grows a part of the atlas a frame. When room runs out,
+// the emptiest slabs are emptied into the others, a part of the atlas a frame, too.
 class Layout final : public atlas::Layout {
  public:
   static StatusOr<std::unique_ptr<Layout>> create(const scene::Scene& scene, const LayoutSettings& settings);
