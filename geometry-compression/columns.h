@@ -1,5 +1,6 @@
 // A column: the values of one field over all items of a section, cut into runs of kRunLength. Each run has
-// its own exp-Golomb order, chosen by cost, or is all zeros and then takes no bits beside its 5-bit header.
+// its own code, the cheapest, named by a header: exp-Golomb of some order; plain numbers of a few bits, for
+// kinds and flags; or none, when all its values are 0.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +14,10 @@
 namespace tessera::geometry_compression {
 
 constexpr uint32_t kRunLength = 64;
-constexpr uint32_t kOrderBits = 5;
-constexpr uint32_t kAllZeros = 31;  // in place of an order
+constexpr uint32_t kCodeBits = 5;
+// Codes up to kLastOrder are exp-Golomb of that order, those above it plain numbers of 1, 2, … bits.
+constexpr uint32_t kLastOrder = 24;
+constexpr uint32_t kAllZeros = 31;
 
 void write_column(BitWriter& out, std::span<const uint32_t> values);
 

@@ -11,7 +11,7 @@
 
 namespace tessera::geometry_compression {
 
-constexpr uint8_t kMetaVersion = 2;
+constexpr uint8_t kMetaVersion = 3;
 
 // Where the bits of one packet went, for reports.
 struct MetaBits {

@@ -1,6 +1,7 @@
 // Patches: whose they are, how many triangles, and which vertices. A vertex id is named by a rule: the next
 // new vertex, a corner of the patch before, … Each corner keeps its rules in the order of their last use, so
-// that the regular parts of a mesh take about one bit a corner.
+// that the regular parts of a mesh take about one bit a corner. Corners of one patch have mostly come one
+// soon after the other, so what no rule names is near another corner of the same patch.
 #include <algorithm>
 #include <numeric>
 
@@ -10,11 +11,11 @@
 namespace tessera::geometry_compression {
 namespace {
 
-// Rules by number: 0 = the newest vertex + 1; 1..5 = corner 0..4 of the patch before; 6 = 1 after the same
-// corner of the patch before; 7 = 1 before it; 8 = spelled out, as difference to the same corner of the patch
-// before.
-constexpr int kRules = 9;
-constexpr int kSpelledOut = 8;
+// Rules by number: 0 = the newest vertex + 1; 1..5 = corner 0..4 of the patch before; 6, 7 = 1 after, 1
+// before the same corner of the patch before; 8, 9 = 1 after, 1 before the corner before, 10, 11 = the one
+// before that; 12 = spelled out, as difference to predicted().
+constexpr int kRules = 13;
+constexpr int kSpelledOut = 12;
 
 class CornerRules {
  public:
@@ -23,22 +24,33 @@ class CornerRules {
     for (auto& order : order_) std::iota(order.begin(), order.end(), uint8_t{0});
   }
 
-  uint32_t base(int corner) const { return last_[corner]; }
+  // For all that follow: `v` are the vertices of the patch, of which those of corners below `corner` count.
+  using Vertices = std::array<uint32_t, kMaxCorners>;
+
+  // Two triangles share corners 1 and 2 (meta_frame.h), so 3 closes a parallelogram.
+  uint32_t predicted(const Vertices& v, int corner) const {
+    if (corner == 0) return last_[0];
+    if (corner == 3) return v[1] + v[2] - v[0];
+    return corner == 4 ? v[3] : v[0];
+  }
   // The id that `rule` (not kSpelledOut) names.
-  uint32_t named(int rule, int corner) const {
+  uint32_t named(int rule, const Vertices& v, int corner) const {
     if (rule == 0) return next_new_;
     if (rule <= kMaxCorners) return last_[rule - 1];
-    return rule == 6 ? last_[corner] + 1 : last_[corner] - 1;
+    const uint32_t base = rule < 8    ? last_[corner]
+                          : rule < 10 ? here_or_last(v, corner, 1)
+                                      : here_or_last(v, corner, 2);
+    return rule % 2 == 0 ? base + 1 : base - 1;
   }
   int rule_at(int rank, int corner) const { return order_[corner][rank]; }
-  // The first rank whose rule names `id`.
-  int rank_of(uint32_t id, int corner) const {
+  // The first rank whose rule names the corner's id.
+  int rank_of(const Vertices& v, int corner) const {
     int spelled_out = 0;
     for (int rank = 0; rank < kRules; ++rank) {
       const int rule = rule_at(rank, corner);
       if (rule == kSpelledOut)
         spelled_out = rank;
-      else if (named(rule, corner) == id)
+      else if (named(rule, v, corner) == v[corner])
         return rank;
     }
     return spelled_out;
@@ -53,8 +65,13 @@ class CornerRules {
   }
 
  private:
+  // The corner that is `back` before this one; where the patch has none, this one of the patch before.
+  uint32_t here_or_last(const Vertices& v, int corner, int back) const {
+    return corner >= back ? v[corner - back] : last_[corner];
+  }
+
   uint32_t next_new_;
-  std::array<uint32_t, kMaxCorners> last_{};
+  Vertices last_{};  // of the last patch that has the corner
   std::array<std::array<uint8_t, kRules>, kMaxCorners> order_{};
 };
 
@@ -79,9 +96,9 @@ void write_patches(BitWriter& out, std::span<const NewPatch> patches, uint32_t f
     triangles.push_back(delta(patch.triangles, previous_triangles));
     previous_triangles = patch.triangles;
     for (int corner = 0; corner < corner_count(patch); ++corner) {
-      const uint32_t id = patch.vertices[corner];
-      const int rank = rules.rank_of(id, corner);
-      if (rules.rule_at(rank, corner) == kSpelledOut) spelled_out.push_back(delta(id, rules.base(corner)));
+      const int rank = rules.rank_of(patch.vertices, corner);
+      if (rules.rule_at(rank, corner) == kSpelledOut)
+        spelled_out.push_back(delta(patch.vertices[corner], rules.predicted(patch.vertices, corner)));
       ranks[corner].push_back(static_cast<uint32_t>(rank));
       rules.used(rank, corner);
     }
@@ -150,10 +167,11 @@ std::string read_patches(BitReader& in, uint32_t count, uint32_t first_vertex,
       if (rank >= kRules) return "patches: there is no vertex rule " + std::to_string(rank);
       const int rule = rules.rule_at(static_cast<int>(rank), corner);
       if (rule != kSpelledOut) {
-        patch.vertices[corner] = rules.named(rule, corner);
+        patch.vertices[corner] = rules.named(rule, patch.vertices, corner);
       } else {
         if (next_spelled_out == columns.spelled_out.size()) return "patches: too few spelled-out vertices";
-        patch.vertices[corner] = undelta(columns.spelled_out[next_spelled_out++], rules.base(corner));
+        patch.vertices[corner] =
+            undelta(columns.spelled_out[next_spelled_out++], rules.predicted(patch.vertices, corner));
       }
       rules.used(static_cast<int>(rank), corner);
     }

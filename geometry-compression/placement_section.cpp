@@ -115,18 +115,40 @@ void write_blocks(BitWriter& out, std::span<const PatchPlacement> placements) {
   for (const auto& column : c.spacing) write_column(out, column);
 }
 
-void write_colors(BitWriter& out, std::span<const PatchPlacement> placements) {
-  for (uint32_t shift : {0, 8, 16}) {
-    std::vector<uint32_t> column;
-    uint32_t previous = 0;
-    for (const PatchPlacement& p : placements) {
-      if (p.kind != PlacementKind::color) continue;
-      const uint32_t channel = (p.rgb >> shift) & 0xff;
-      column.push_back(delta(channel, previous));
-      previous = channel;
-    }
-    write_column(out, column);
+// From one colour to the next mostly brightness changes, so red and blue go with green; and most of the rest
+// lies between warm and cold light, where blue loses what red gains.
+class ColorPrediction {
+ public:
+  // The channels in the order that they are coded in, as shifts in PatchPlacement::rgb.
+  static constexpr uint32_t kShifts[] = {8, 0, 16};
+
+  // Of channel `i` of kShifts, from those before it. Wraps modulo 2^32.
+  uint32_t next(size_t i) const {
+    return previous_[i] + (i == 0 ? 0 : i == 1 ? change_[0] : 2 * change_[0] - change_[1]);
   }
+  void is(size_t i, uint32_t channel) {
+    change_[i] = channel - previous_[i];
+    previous_[i] = channel;
+  }
+
+ private:
+  std::array<uint32_t, 3> previous_{}, change_{};
+};
+
+using ColorColumns = std::array<std::vector<uint32_t>, std::size(ColorPrediction::kShifts)>;
+
+void write_colors(BitWriter& out, std::span<const PatchPlacement> placements) {
+  ColorColumns columns;
+  ColorPrediction prediction;
+  for (const PatchPlacement& p : placements) {
+    if (p.kind != PlacementKind::color) continue;
+    for (size_t i = 0; i < columns.size(); ++i) {
+      const uint32_t channel = (p.rgb >> ColorPrediction::kShifts[i]) & 0xff;
+      columns[i].push_back(delta(channel, prediction.next(i)));
+      prediction.is(i, channel);
+    }
+  }
+  for (const auto& column : columns) write_column(out, column);
 }
 
 BlockColumns read_block_columns(BitReader& in, uint32_t count, bool spaced) {
@@ -209,17 +231,20 @@ std::string read_blocks(BitReader& in, uint32_t count, std::vector<PatchPlacemen
 }
 
 std::string read_colors(BitReader& in, uint32_t count, std::vector<PatchPlacement>& placements) {
-  for (uint32_t shift : {0, 8, 16}) {
-    const auto column = read_column(in, count);
-    if (!in.ok()) return {};
-    uint32_t channel = 0;
-    size_t next = 0;
-    for (PatchPlacement& p : placements) {
-      if (p.kind != PlacementKind::color) continue;
-      channel = undelta(column[next++], channel);
+  ColorColumns columns;
+  for (auto& column : columns) column = read_column(in, count);
+  if (!in.ok()) return {};
+  ColorPrediction prediction;
+  size_t next = 0;
+  for (PatchPlacement& p : placements) {
+    if (p.kind != PlacementKind::color) continue;
+    for (size_t i = 0; i < columns.size(); ++i) {
+      const uint32_t channel = undelta(columns[i][next], prediction.next(i));
       if (channel > 255) return "placement of patch " + std::to_string(p.patch) + ": a colour is not 0..255";
-      p.rgb |= channel << shift;
+      p.rgb |= channel << ColorPrediction::kShifts[i];
+      prediction.is(i, channel);
     }
+    ++next;
   }
   return {};
 }

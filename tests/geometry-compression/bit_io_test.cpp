@@ -136,24 +136,37 @@ TEST(Columns, KeepRunsOfEveryKindAndLength) {
     }
 }
 
-TEST(Columns, ARunTakesItsCheapestOrderAndZerosTakeNothing) {
+TEST(Columns, ARunTakesItsCheapestCodeAndZerosTakeNothing) {
   const auto bits = [](const std::vector<uint32_t>& values) {
     BitWriter out;
     write_column(out, values);
     return out.bit_count();
   };
-  EXPECT_EQ(bits(std::vector<uint32_t>(kRunLength, 0)), kOrderBits);
-  EXPECT_EQ(bits(std::vector<uint32_t>(kRunLength, 255)), kOrderBits + kRunLength * 9);  // order 8
+  EXPECT_EQ(bits(std::vector<uint32_t>(kRunLength, 0)), kCodeBits);
+  EXPECT_EQ(bits(std::vector<uint32_t>(kRunLength, 255)), kCodeBits + kRunLength * 9);  // order 8
   std::mt19937 random(3);
   std::vector<uint32_t> mixed(kRunLength);
   for (uint32_t& v : mixed) v = static_cast<uint32_t>(random()) >> (random() % 32);
   uint64_t best = UINT64_MAX;
-  for (uint32_t order = 0; order < kAllZeros; ++order) {
-    uint64_t sum = kOrderBits;
+  for (uint32_t order = 0; order <= kLastOrder; ++order) {
+    uint64_t sum = kCodeBits;
     for (uint32_t v : mixed) sum += exp_golomb_bits(v, order);
     best = std::min(best, sum);
   }
   EXPECT_EQ(bits(mixed), best);
+}
+
+TEST(Columns, EvenlySpreadSmallValuesArePlainNumbers) {
+  for (uint32_t width = 1; kLastOrder + width < kAllZeros; ++width) {
+    std::vector<uint32_t> values(kRunLength);
+    for (uint32_t i = 0; i < kRunLength; ++i) values[i] = (i * 37) % (1u << width);
+    BitWriter out;
+    write_column(out, values);
+    EXPECT_EQ(out.bit_count(), kCodeBits + kRunLength * width);
+    const auto bytes = exactly(std::move(out).take());
+    BitReader in(bytes);
+    EXPECT_EQ(read_column(in, kRunLength), values);
+  }
 }
 
 }  // namespace
