@@ -19,7 +19,7 @@ constexpr int kMcuRows = 16;  // lines of luma that libjpeg takes at a time
 
 // Annex K's chroma steps grow from 17 to 99, for eyes that see fine colours badly. At half of luma's
 // resolution one for all is nearer to the truth at equal bits, in luma and in RGB (docs/layouts.md).
-constexpr uint16_t kChromaQuantiser = 48;
+constexpr uint16_t kChromaQuantiser = 64;
 
 // libjpeg reports errors by a callback that must not return. This one jumps back to where `jump` was set; no
 // object with a destructor may be made in between.
