@@ -25,6 +25,7 @@ struct PictureStreamer::Impl {
   TruthSource& source;
   View client;
   server::RateSplit rate;
+  server::BitBalance balance;
   std::unique_ptr<codec::VideoEncoder> encoder;
   std::unique_ptr<codec::VideoDecoder> decoder;
   std::unique_ptr<MeshWarp> warp;
@@ -80,9 +81,10 @@ StatusOr<std::vector<Packet>> PictureStreamer::serve(const ServeRequest& request
                            impl_->source.render(view, request.scene_time_ns, {.depth = with_depth}));
   const bool key_frame = std::exchange(impl_->first, false) || request.key_frame;
   const YuvImage yuv = codec::rgb_to_yuv(rendered->color);
+  const double budget = impl_->balance.atlas_bits(impl_->rate, 0, key_frame);
   TESSERA_ASSIGN_OR_RETURN(codec::AccessUnit unit,
-                           impl_->encoder->encode(request.number, codec::view_of(yuv),
-                                                  impl_->rate.atlas_bits(0, key_frame), key_frame));
+                           impl_->encoder->encode(request.number, codec::view_of(yuv), budget, key_frame));
+  impl_->balance.spend(8.0 * static_cast<double>(unit.bytes.size()));
   impl_->sources[request.number] = {view, rendered};
   std::vector<Packet> packets;
   packets.push_back({Channel::atlas, std::move(unit.bytes)});

@@ -19,11 +19,13 @@ StatusOr<RateClient> RateClient::create(const LoopbackSettings& settings, double
 
 StatusOr<double> RateClient::serve(FrameNumber frame, const YuvView& atlas, double meta_bits) {
   const bool key_frame = std::exchange(first_, false);
-  const double budget = rate_.atlas_bits(meta_bits, key_frame);
+  const double budget = balance_.atlas_bits(rate_, meta_bits, key_frame);
   TESSERA_ASSIGN_OR_RETURN(const codec::AccessUnit unit, encoder_->encode(frame, atlas, budget, key_frame));
   TESSERA_ASSIGN_OR_RETURN(const codec::DecodedFrame decoded, decoder_->decode(unit.bytes));
   decoded_ = decoded.picture;
-  return 8.0 * static_cast<double>(unit.bytes.size());
+  const double bits = 8.0 * static_cast<double>(unit.bytes.size());
+  balance_.spend(bits);
+  return bits;
 }
 
 }  // namespace tessera::bench

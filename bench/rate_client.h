@@ -23,6 +23,7 @@ class RateClient {
 
  private:
   server::RateSplit rate_;
+  server::BitBalance balance_;
   std::unique_ptr<codec::AtlasEncoder> encoder_;
   std::unique_ptr<codec::AtlasDecoder> decoder_;
   YuvView decoded_;

@@ -3,10 +3,18 @@
 #include <algorithm>
 
 namespace tessera::server {
+namespace {
+
+constexpr double kMostBalance = 0.25;  // of a frame
+
+}  // namespace
+
+double RateSplit::allowance(bool key_frame) const {
+  return frame_bits() * (key_frame ? key_frame_budgets : 1.0);
+}
 
 double RateSplit::atlas_bits(double meta_bits, bool key_frame) const {
-  const double allowance = frame_bits() * (key_frame ? key_frame_budgets : 1.0);
-  return std::max(allowance - meta_bits, atlas_floor * allowance);
+  return std::max(allowance(key_frame) - meta_bits, atlas_floor * allowance(key_frame));
 }
 
 RateSplit RateSplit::at_interval(DurationNs interval_ns) const {
@@ -19,6 +27,18 @@ RateSplit RateSplit::at_interval(DurationNs interval_ns) const {
 
 bool RateSplit::may_render(DurationNs backlog_ns) const {
   return to_seconds(backlog_ns) * frames_per_second <= 1.0;
+}
+
+double BitBalance::atlas_bits(const RateSplit& rate, double meta_bits, bool key_frame) {
+  // A key frame takes several frames' bits as it is; and the rate may have fallen.
+  limit_ = key_frame ? 0 : kMostBalance * rate.allowance(false);
+  balance_ = std::clamp(balance_, -limit_, limit_);
+  open_ = rate.allowance(key_frame) + balance_ - meta_bits;
+  return rate.atlas_bits(meta_bits - balance_, key_frame);
+}
+
+void BitBalance::spend(double atlas_bits) {
+  balance_ = std::clamp(open_ - atlas_bits, -limit_, limit_);
 }
 
 }  // namespace tessera::server

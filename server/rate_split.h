@@ -12,6 +12,8 @@ struct RateSplit {
   double key_frame_budgets = 4;  // a key frame may take this many frames' bits
 
   double frame_bits() const { return bitrate_bps / frames_per_second; }
+  // Of a frame, both streams together.
+  double allowance(bool key_frame) const;
   // For frames that come further apart than planned: a frame may then take half of its time, as long as a key
   // frame may take at most. Key frames stay as they are.
   RateSplit at_interval(DurationNs interval_ns) const;
@@ -21,6 +23,21 @@ struct RateSplit {
   // before it is rendered, so that latency does not build up. `backlog_ns` = time until the sender's queue
   // has drained.
   bool may_render(DurationNs backlog_ns) const;
+};
+
+// What frames take less or more than their bits, for those after them: encoders never use all that they may,
+// and geometry beside an atlas at its floor takes more. A quarter of a frame either way at most, so that no
+// frame takes much longer on its way; over time the rate is used and kept.
+class BitBalance {
+ public:
+  // RateSplit::atlas_bits() with what was left so far. To be followed by spend().
+  double atlas_bits(const RateSplit& rate, double meta_bits, bool key_frame);
+  void spend(double atlas_bits);
+
+ private:
+  double balance_ = 0;
+  double open_ = 0,
+         limit_ = 0;  // of the frame in question: what its atlas may take, and of the balance after
 };
 
 }  // namespace tessera::server

@@ -52,6 +52,7 @@ struct Session::Impl {
   std::unique_ptr<codec::AtlasEncoder> encoder;
   codec::Occupancy used;  // of the atlas; only where the codec asks for it
   std::optional<MetaBuilder> meta;
+  BitBalance balance;  // of video
   bool first = true;
 
   std::vector<Eye> eyes;
@@ -154,12 +155,16 @@ Status Session::Impl::encode(const FrameInput& input, const atlas::LayoutDelta& 
       static_cast<uint32_t>(static_cast<uint64_t>(to_seconds(input.poses.back().time_ns) * kRtpClockHz));
   frame.meta = geometry_compression::encode(values, &frame.stats.meta_bits);
 
-  // Only video has frames that cost more than others because nothing came before them.
-  const bool key_frame =
-      (std::exchange(first, false) || input.key_frame) && settings.codec == AtlasCodec::h264;
-  const double budget = settings.rate.at_interval(input.interval_ns)
-                            .atlas_bits(8.0 * static_cast<double>(frame.meta.size()), key_frame);
+  // Only video has frames that cost more than others because nothing came before them; and JPEG takes nearly
+  // all of each frame's bits by itself.
+  const bool video = settings.codec == AtlasCodec::h264;
+  const bool key_frame = (std::exchange(first, false) || input.key_frame) && video;
+  const RateSplit rate = settings.rate.at_interval(input.interval_ns);
+  const double meta_bits = 8.0 * static_cast<double>(frame.meta.size());
+  const double budget =
+      video ? balance.atlas_bits(rate, meta_bits, key_frame) : rate.atlas_bits(meta_bits, key_frame);
   TESSERA_ASSIGN_OR_RETURN(frame.atlas, encoder->encode(frame.number, coded_picture(), budget, key_frame));
+  if (video) balance.spend(8.0 * static_cast<double>(frame.atlas.bytes.size()));
   return absl::OkStatus();
 }
 

@@ -42,5 +42,64 @@ TEST(RateSplit, SkipsAFrameWhileTheNetworkHoldsMoreThanOne) {
   EXPECT_FALSE(kSplit.may_render(from_seconds(1.01 / 30)));
 }
 
+// Encoders that use a share of what they may, geometry of any size: in the long run the rate is used and
+// kept.
+TEST(BitBalance, TheRateIsUsedAndKept) {
+  constexpr int kFrames = 1000;
+  for (const double used : {0.8, 0.85, 0.95, 1.0, 1.05}) {
+    BitBalance balance;
+    double sum = 0;
+    for (int frame = 0; frame < kFrames; ++frame) {
+      const double meta = 50e3 + 1e3 * (frame * 37 % 100);
+      const double budget = balance.atlas_bits(kSplit, meta, false);
+      EXPECT_LE(budget + meta, 1.25 * 600e3 + 1);
+      const double bits = used * budget;
+      balance.spend(bits);
+      sum += meta + bits;
+    }
+    const double rate = sum / kFrames / kSplit.frame_bits();
+    EXPECT_GT(rate, 0.99) << used;
+    EXPECT_LT(rate, 1.001) << used;
+  }
+}
+
+TEST(BitBalance, AFrameThatNeedsNothingLeavesAQuarterOfAFrameAtMost) {
+  BitBalance balance;
+  for (int frame = 0; frame < 10; ++frame) {
+    balance.atlas_bits(kSplit, 0, false);
+    balance.spend(1000);
+  }
+  EXPECT_DOUBLE_EQ(balance.atlas_bits(kSplit, 0, false), 1.25 * 600e3);
+}
+
+TEST(BitBalance, KeyFramesNeitherTakeNorLeaveAny) {
+  BitBalance balance;
+  balance.atlas_bits(kSplit, 0, false);
+  balance.spend(0);
+  EXPECT_DOUBLE_EQ(balance.atlas_bits(kSplit, 0, true), kSplit.atlas_bits(0, true));
+  balance.spend(0);
+  EXPECT_DOUBLE_EQ(balance.atlas_bits(kSplit, 0, false), kSplit.atlas_bits(0, false));
+}
+
+TEST(BitBalance, WhatALargerRateLeftDoesNotServeASmallerOne) {
+  BitBalance balance;
+  balance.atlas_bits(kSplit, 0, false);
+  balance.spend(0);
+  RateSplit slow = kSplit;
+  slow.bitrate_bps /= 100;
+  EXPECT_DOUBLE_EQ(balance.atlas_bits(slow, 0, false), 1.25 * 6e3);
+}
+
+TEST(BitBalance, GeometryThatTookTooMuchIsPaidBackDownToTheFloor) {
+  BitBalance balance;
+  EXPECT_DOUBLE_EQ(balance.atlas_bits(kSplit, 2e6, false), 0.25 * 600e3);
+  balance.spend(0.25 * 600e3);
+  EXPECT_DOUBLE_EQ(balance.atlas_bits(kSplit, 0, false), 0.75 * 600e3);
+  balance.spend(0.75 * 600e3);
+  EXPECT_DOUBLE_EQ(balance.atlas_bits(kSplit, 400e3, false), 200e3);
+  balance.spend(400e3);
+  EXPECT_DOUBLE_EQ(balance.atlas_bits(kSplit, 400e3, false), 0.25 * 600e3);
+}
+
 }  // namespace
 }  // namespace tessera::server
