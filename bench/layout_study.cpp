@@ -11,6 +11,7 @@
 #include "bench/shading_streamer.h"
 #include "bench/study_scene.h"
 #include "bench/texel_picture.h"
+#include "pvs/prediction.h"
 #include "pvs/visibility.h"
 
 namespace tessera::bench {
@@ -57,6 +58,9 @@ class Study {
   std::vector<Case> cases() const;
   Status measure(const Case& c);
   Status measure_texel_shading();
+  // What has arrived of the client's poses when a frame is served, and the views that its session predicts.
+  std::vector<TimedPose> poses_at(uint32_t index) const;
+  std::vector<View> predicted_at(uint32_t index) const;
   Status serve(ShadingStreamer& streamer, uint32_t index, const Case& c, Series& series);
   Status code(const YuvView& atlas, uint32_t index, double meta_bits, Series& series) const;
   Status look(ShadingStreamer& streamer, uint32_t index, const Case& c, Series& series);
@@ -113,18 +117,30 @@ std::vector<Study::Case> Study::cases() const {
   return out;
 }
 
-Status Study::serve(ShadingStreamer& streamer, uint32_t index, const Case& c, Series& series) {
+std::vector<TimedPose> Study::poses_at(uint32_t index) const {
   const LoopbackSettings& s = settings_.common;
-  // What has arrived of the client's poses.
   std::vector<TimedPose> poses;
   const TimeNs newest = served_at(index) - from_ms(s.delay_ms);
   for (int back = 7; back >= 0; --back) {
     const TimeNs at = newest - from_seconds(back / s.fps);
     poses.push_back({at, pose_at(at)});
   }
+  return poses;
+}
+
+std::vector<View> Study::predicted_at(uint32_t index) const {
+  const std::vector<TimedPose> poses = poses_at(index);
+  pvs::PredictionSettings prediction = session_settings(settings_.common).prediction;
+  const TimeNs newest = poses.back().time_ns;
+  prediction.horizon_ns = shown_at(index) - newest + from_seconds(1 / settings_.common.server_fps);
+  return pvs::predict_views(poses, newest, client_view(settings_.common), prediction);
+}
+
+Status Study::serve(ShadingStreamer& streamer, uint32_t index, const Case& c, Series& series) {
+  const std::vector<TimedPose> poses = poses_at(index);
   const ServeRequest request{.number = index,
                              .poses = poses,
-                             .round_trip_ns = shown_at(index) - newest,
+                             .round_trip_ns = shown_at(index) - poses.back().time_ns,
                              .scene_time_ns = served_at(index)};
   TESSERA_ASSIGN_OR_RETURN(const std::vector<Packet> packets, streamer.serve(request));
   double meta_bits = 0;
@@ -233,7 +249,8 @@ Status Study::measure(const Case& c) {
 }
 
 // Nothing of it is streamed: its texture is too large. Its pictures are what a client would show that has
-// all of it, shaded a moment ago.
+// all of it, shaded a moment ago; its samples are those that a server would shade for it: of everything that
+// the predicted views see, as in TSS.
 Status Study::measure_texel_shading() {
   const TimeNs begin = shown_at(settings_.warm_up_frames);
   View view = client_view(settings_.common);
@@ -248,15 +265,18 @@ Status Study::measure_texel_shading() {
                                                                   on_->shared->lighting(), texture));
   LayoutRow& row = result_.rows.emplace_back(LayoutRow{.layout = kTexelShading});
   ErrorMean error;
+  double picture_samples = 0;
   for (uint32_t i = 0; i < frame_count(); ++i) {
     progress_.advance();
     if (!is_scored(i)) continue;
     view.pose = pose_at(shown_at(i));
     TESSERA_ASSIGN_OR_RETURN(const RenderedImage truth, truth_->truth(view, shown_at(i)));
-    TESSERA_ASSIGN_OR_RETURN(TexelPicture shown, draw_texels(texture, *shader, *truth_, view, shown_at(i)));
+    TESSERA_ASSIGN_OR_RETURN(TexelPicture shown,
+                             draw_texels(texture, *shader, *truth_, view, predicted_at(i), shown_at(i)));
     const Comparison compared = compare_images(truth->color, shown.image);
     error.add(compared.error);
-    row.samples += static_cast<double>(shown.samples) / result_.frames;
+    row.samples += static_cast<double>(shown.samples_ahead) / result_.frames;
+    picture_samples += static_cast<double>(shown.samples) / result_.frames;
     if (i == settings_.warm_up_frames)
       result_.pictures.push_back({kTexelShading,
                                   compared.error.mssim,
@@ -265,6 +285,7 @@ Status Study::measure_texel_shading() {
                                   dssim_picture(compared.ssim),
                                   {}});
   }
+  row.picture_samples = picture_samples;
   row.error = error.mean();
   return absl::OkStatus();
 }
@@ -314,6 +335,7 @@ nlohmann::json to_json(const LayoutRow& row) {
                         {"layout_ms", to_json(row.layout_ms)},
                         {"shading_ms", to_json(row.shading_ms)},
                         {"draw_ms", to_json(row.draw_ms)}};
+  if (row.picture_samples) out["picture_samples"] = *row.picture_samples;
   if (row.bitrate_mbps) out["bitrate_mbps"] = *row.bitrate_mbps;
   if (row.coded) out["mssim_coded"] = row.coded->mssim;
   return out;
@@ -373,6 +395,10 @@ std::string to_text(const LayoutStudyResult& result) {
         100 * r.outside_share, r.bias, r.error.mssim, r.coded ? absl::StrFormat("%.4f", r.coded->mssim) : "-",
         r.atlas_kbit + r.meta_kbit, r.meta_kbit, r.layout_ms.p50, r.shading_ms.p50, r.draw_ms.p50);
   }
+  for (const LayoutRow& r : result.rows)
+    if (r.picture_samples)
+      absl::StrAppendFormat(&text, "%s: the scored pictures read %.0f of these samples\n", r.layout,
+                            *r.picture_samples);
   for (const std::string& other : result.settings.layouts) {
     for (const LayoutComparison& c : compare_layouts(result.rows, other)) {
       if (!c.dssim_ratio && !c.bits_ratio) continue;

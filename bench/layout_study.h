@@ -1,7 +1,8 @@
 // What each layout makes of the same path: image error by shaded samples (TSS tables 3, 4), bits by image
 // error, and what drawing costs the client. One layout after another streams the same frames over a link
 // without loss; the client draws each scored frame at the pose that it has when the frame reaches it. Texel
-// shading (bench/texel_shading.h) stands beside them as a baseline.
+// shading (bench/texel_shading.h) stands beside them as a baseline, for the same predicted views (but without
+// what a session retains of those before).
 #pragma once
 
 #include <optional>
@@ -29,11 +30,12 @@ std::vector<std::string> layout_study_options();
 // One layout, atlas size and bit rate. Means over frames after those of the warm-up.
 struct LayoutRow {
   std::string layout;
-  uint32_t width = 0, height = 0;      // of the atlas
-  std::optional<double> bitrate_mbps;  // the limit
-  double samples = 0;                  // shaded a frame
-  double outside_share = 0;            // of them, outside their triangles
-  double fill = 0;                     // samples, per texel of the atlas
+  uint32_t width = 0, height = 0;         // of the atlas
+  std::optional<double> bitrate_mbps;     // the limit
+  double samples = 0;                     // shaded a frame, for all that may come into view
+  double outside_share = 0;               // of them, outside their triangles
+  std::optional<double> picture_samples;  // texel shading: those that the very picture reads
+  double fill = 0;                        // samples, per texel of the atlas
   double bias = 0;
   double blocks = 0, colors = 0, out_of_memory = 0, changed = 0;  // placements a frame
   ImageError error;                                               // before coding

@@ -25,6 +25,12 @@ vec3 color_of(const uint8_t* rgb) {
   return {rgb[0], rgb[1], rgb[2]};
 }
 
+void sort_uniquely(std::vector<TexelTile>& tiles) {
+  std::ranges::sort(tiles);
+  const auto repeated = std::ranges::unique(tiles);
+  tiles.erase(repeated.begin(), repeated.end());
+}
+
 // The shaded texels of a picture.
 class Texels {
  public:
@@ -32,9 +38,7 @@ class Texels {
 
   void add(std::span<const TexelTile> tiles) {
     tiles_.insert(tiles_.end(), tiles.begin(), tiles.end());
-    std::ranges::sort(tiles_);
-    const auto repeated = std::ranges::unique(tiles_);
-    tiles_.erase(repeated.begin(), repeated.end());
+    sort_uniquely(tiles_);
   }
 
   StatusOr<uint64_t> shade(TexelShader& shader, const scene::SceneInstant& instant, const View& viewer) {
@@ -47,6 +51,15 @@ class Texels {
       colors_.insert(colors_.end(), shaded.colors.begin(), shaded.colors.end());
       samples += shaded.samples;
     }
+    return samples;
+  }
+
+  // With tiles that are not shaded.
+  uint64_t samples_with(std::vector<TexelTile> others) const {
+    others.insert(others.end(), tiles_.begin(), tiles_.end());
+    sort_uniquely(others);
+    uint64_t samples = 0;
+    for (const TexelTile& tile : others) samples += texture_.samples(tile);
     return samples;
   }
 
@@ -94,7 +107,7 @@ Image8 rounded(const View& view, std::span<const vec3> colors) {
 }  // namespace
 
 StatusOr<TexelPicture> draw_texels(const UniqueTexture& texture, TexelShader& shader, TruthSource& truth,
-                                   const View& view, TimeNs scene_time_ns) {
+                                   const View& view, std::span<const View> predicted, TimeNs scene_time_ns) {
   Texels texels(texture);
   std::array<RenderedImage, std::size(kPoints)> ids;
   std::vector<dmat4> transforms;
@@ -106,6 +119,14 @@ StatusOr<TexelPicture> draw_texels(const UniqueTexture& texture, TexelShader& sh
   }
   TexelPicture out;
   TESSERA_ASSIGN_OR_RETURN(out.samples, texels.shade(shader, truth.instant(), view));
+  std::vector<TexelTile> ahead;
+  for (const View& other : predicted) {
+    TESSERA_ASSIGN_OR_RETURN(const RenderedImage seen,
+                             truth.render(other, scene_time_ns, {.samples = 1, .ids = true}));
+    const std::vector<TexelTile> tiles = texture.visible_tiles(seen->triangle_plus_one, other, transforms);
+    ahead.insert(ahead.end(), tiles.begin(), tiles.end());
+  }
+  out.samples_ahead = texels.samples_with(std::move(ahead));
 
   const vec3 background = color_of(client::kDefaultBackground.data());
   std::vector<vec3> sum(size_t{view.width} * view.height, vec3(0));

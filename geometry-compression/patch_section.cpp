@@ -27,7 +27,7 @@ class CornerRules {
   // For all that follow: `v` are the vertices of the patch, of which those of corners below `corner` count.
   using Vertices = std::array<uint32_t, kMaxCorners>;
 
-  // Two triangles share corners 1 and 2 (meta_frame.h), so 3 closes a parallelogram.
+  // Corner 3 closes the parallelogram of a patch of two triangles (meta_frame.h); of three it is a guess.
   uint32_t predicted(const Vertices& v, int corner) const {
     if (corner == 0) return last_[0];
     if (corner == 3) return v[1] + v[2] - v[0];
@@ -55,9 +55,9 @@ class CornerRules {
     }
     return spelled_out;
   }
-  void used(int rank, int corner) {
+  void used(int rank, uint32_t id, int corner) {
     auto& order = order_[corner];
-    if (order[rank] == 0) ++next_new_;
+    if (id == next_new_) ++next_new_;
     std::rotate(order.begin(), order.begin() + rank, order.begin() + rank + 1);
   }
   void end_patch(const NewPatch& patch) {
@@ -100,7 +100,7 @@ void write_patches(BitWriter& out, std::span<const NewPatch> patches, uint32_t f
       if (rules.rule_at(rank, corner) == kSpelledOut)
         spelled_out.push_back(delta(patch.vertices[corner], rules.predicted(patch.vertices, corner)));
       ranks[corner].push_back(static_cast<uint32_t>(rank));
-      rules.used(rank, corner);
+      rules.used(rank, patch.vertices[corner], corner);
     }
     rules.end_patch(patch);
   }
@@ -173,7 +173,7 @@ std::string read_patches(BitReader& in, uint32_t count, uint32_t first_vertex,
         patch.vertices[corner] =
             undelta(columns.spelled_out[next_spelled_out++], rules.predicted(patch.vertices, corner));
       }
-      rules.used(static_cast<int>(rank), corner);
+      rules.used(static_cast<int>(rank), patch.vertices[corner], corner);
     }
     rules.end_patch(patch);
   }

@@ -30,15 +30,16 @@ bool RateSplit::may_render(DurationNs backlog_ns) const {
 }
 
 double BitBalance::atlas_bits(const RateSplit& rate, double meta_bits, bool key_frame) {
-  // A key frame takes several frames' bits as it is; and the rate may have fallen.
-  limit_ = key_frame ? 0 : kMostBalance * rate.allowance(false);
+  const double allowance = rate.allowance(key_frame);
+  // None takes more than a key frame; and the rate may have fallen.
+  limit_ = std::min(kMostBalance * allowance, rate.allowance(true) - allowance);
   balance_ = std::clamp(balance_, -limit_, limit_);
-  open_ = rate.allowance(key_frame) + balance_ - meta_bits;
+  unspent_ = kMeanShare * allowance + balance_ - meta_bits;
   return rate.atlas_bits(meta_bits - balance_, key_frame);
 }
 
 void BitBalance::spend(double atlas_bits) {
-  balance_ = std::clamp(open_ - atlas_bits, -limit_, limit_);
+  balance_ = std::clamp(unspent_ - atlas_bits, -limit_, limit_);
 }
 
 }  // namespace tessera::server

@@ -25,19 +25,22 @@ struct RateSplit {
   bool may_render(DurationNs backlog_ns) const;
 };
 
-// What frames take less or more than their bits, for those after them: encoders never use all that they may,
-// and geometry beside an atlas at its floor takes more. A quarter of a frame either way at most, so that no
-// frame takes much longer on its way; over time the rate is used and kept.
+// What frames take less or more than their bits, for those after them: encoders stay below what they may
+// take, and geometry beside an atlas at its floor takes more. A quarter of a frame either way at most, so
+// that no frame takes much longer on its way. Within these bounds the frames' mean is kept a little below the
+// rate: packets have headers, and what has queued up (a key frame, a resent packet) must drain.
 class BitBalance {
  public:
+  static constexpr double kMeanShare = 0.92;  // of the rate; headers are 4 %
+
   // RateSplit::atlas_bits() with what was left so far. To be followed by spend().
   double atlas_bits(const RateSplit& rate, double meta_bits, bool key_frame);
   void spend(double atlas_bits);
 
  private:
   double balance_ = 0;
-  double open_ = 0,
-         limit_ = 0;  // of the frame in question: what its atlas may take, and of the balance after
+  double limit_ = 0;    // of the balance, either way
+  double unspent_ = 0;  // the balance if the atlas took nothing
 };
 
 }  // namespace tessera::server

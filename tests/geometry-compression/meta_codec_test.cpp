@@ -114,26 +114,28 @@ TEST(MetaCodec, TestVectorOfTheSpecification) {
   f.rtp_timestamp = 21000;
   f.atlas_width = 2048;
   f.atlas_height = 1024;
-  f.full_state = true;
   f.meshes = {{{1, 2, 3}, 0.5}};
   f.vertices = {{0, {0, 0, 0}}, {0, {100, 0, -4}}, {0, {0, 50, 0}}, {0, {101, 50, -4}}};
   NewObject object;
   object.double_sided = true;
   object.transform.translation = {0, 4, 0};
   f.objects = {object};
-  f.patches = {{0, 2, {0, 1, 2, 3}}, {0, 1, {2, 3, 0}}};
+  // The last one: spelled out, rules 8 and 11, spelled out by the parallelogram.
+  f.patches = {{0, 2, {60, 61, 62, 63}}, {0, 1, {62, 63, 60}}, {0, 2, {40, 41, 39, 50}}};
   f.placements = {{.patch = 0, .kind = PlacementKind::block, .x = 32, .y = 16, .width = 16, .height = 8},
-                  {.patch = 1, .kind = PlacementKind::color, .rgb = 0x0a141e}};
+                  {.patch = 1, .kind = PlacementKind::color, .rgb = 0x0a141e},
+                  {.patch = 2, .kind = PlacementKind::color, .rgb = 0x0c1a28}};
   const auto bytes = encode(f);
   std::string hex;
   for (uint8_t b : bytes) {
     hex += "0123456789abcdef"[b >> 4];
     hex += "0123456789abcdef"[b & 15];
   }
-  EXPECT_EQ(hex,
-            "54534d4603000000070000520808000400c18302144850001ff800000000000010000000000000000801000000000000"
-            "03fe0000"
-            "0000000005ff900400000000000039639ff460972fe0280cc0cf818197b1e08ebfbe0bdbd9fffab57a8ed3e0");
+  EXPECT_EQ(
+      hex,
+      "54534d46030000000700005208080004004183021c48703c1ff80000000000001000000000000000080100000000000003fe00"
+      "000000000005ff90040000000000003a1a3abe194e0cc506cd046cbd5a8280cc0cf818197b1e08ebfbfa2b6f67ffead4471ced"
+      "11f0");
   expect_round_trip(f);
 }
 

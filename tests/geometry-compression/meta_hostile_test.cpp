@@ -6,6 +6,7 @@
 #include <random>
 
 #include "geometry-compression/bit_io.h"
+#include "geometry-compression/columns.h"
 #include "geometry-compression/meta_codec.h"
 #include "synthetic.h"
 
@@ -57,9 +58,10 @@ TEST(MetaHostile, NoiseBehindAValidHeaderNeverCrashes) {
   }
 }
 
-// The header up to the counts, then `counts`.
-std::vector<uint8_t> header_that_claims(std::array<uint32_t, 6> counts) {
-  BitWriter out;
+// In the order of the sections.
+using SectionCounts = std::array<uint32_t, 6>;
+
+void put_header(BitWriter& out, const SectionCounts& counts) {
   out.put(0x54534D46, 32);
   out.put(kMetaVersion, 8);
   out.put(0, 64);
@@ -67,6 +69,11 @@ std::vector<uint8_t> header_that_claims(std::array<uint32_t, 6> counts) {
   out.put(0, 1);
   for (uint32_t n : counts) out.put_unsigned(n, 6);
   out.put_unsigned(0, 12);
+}
+
+std::vector<uint8_t> header_that_claims(const SectionCounts& counts) {
+  BitWriter out;
+  put_header(out, counts);
   return std::move(out).take();
 }
 
@@ -154,6 +161,27 @@ TEST(MetaHostile, ValuesOutsideTheirRangeAreErrors) {
   EXPECT_TRUE(refuses_block(8192, 2, 2));
   EXPECT_TRUE(refuses_block(0, 9, 1));
   EXPECT_TRUE(refuses_block(0, 1, 0));
+}
+
+TEST(MetaHostile, VertexRulesThatDoNotExistAreErrors) {
+  for (const uint32_t rank : {12u, 13u, 63u}) {
+    BitWriter out;
+    put_header(out, {0, 0, 0, 1, 0, 0});
+    write_column(out, std::vector<uint32_t>{1});  // one triangle less than two
+    write_repeats(out, std::vector<uint32_t>{0});
+    for (const uint32_t of_corner : {0u, rank, 0u}) write_column(out, std::vector<uint32_t>{of_corner});
+    for (int corner = 3; corner < 5; ++corner) write_column(out, {});
+    const bool spelled_out = rank == 12;
+    out.put_unsigned(spelled_out, 4);
+    write_column(out, std::vector<uint32_t>(spelled_out));
+    out.put_unsigned(0, 4);  // vertices' runs of meshes
+    out.put(0, 4);           // placements
+    const std::string error = decode_exactly(std::move(out).take());
+    if (spelled_out)
+      EXPECT_EQ(error, "");
+    else
+      EXPECT_NE(error.find("no vertex rule " + std::to_string(rank)), std::string::npos) << error;
+  }
 }
 
 TEST(MetaHostile, LsAndHalvesOutOfTheirRangesAreErrors) {
