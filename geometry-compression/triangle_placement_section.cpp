@@ -21,6 +21,10 @@ uint16_t pair_pitch(uint8_t level) {
   return static_cast<uint16_t>(width + width % 2);
 }
 
+// The tables below have room for every number of their byte, also for those out of range: a frame with one
+// makes a packet that readers refuse, no worse.
+constexpr size_t kBytes = 256;
+
 // The last L of each level.
 class LastLs {
  public:
@@ -46,7 +50,7 @@ class LastLs {
     uint16_t x = 0, y = 0;
     bool turned = false, known = false;
   };
-  std::array<Place, kMaxLevel + 1> last_{};
+  std::array<Place, kBytes> last_{};
 };
 
 // The last half of each width.
@@ -57,7 +61,7 @@ class LastHalves {
   }
 
  private:
-  std::array<HalfPlacement, kMaxHalfWidth + 1> last_{};
+  std::array<HalfPlacement, kBytes> last_{};
 };
 
 using Column = std::vector<uint32_t>;
