@@ -70,7 +70,8 @@ TEST(LayoutStudy, MeasuresEveryLayout) {
   ASSERT_EQ(result->rows.size(), 9u);
   EXPECT_EQ(result->rows[0].layout, "texel-shading");
   EXPECT_GT(*result->rows[0].picture_samples, 240 * 136);
-  EXPECT_GT(result->rows[0].samples, 1.2 * *result->rows[0].picture_samples);  // the predicted views are larger
+  EXPECT_GT(result->rows[0].samples,
+            1.2 * *result->rows[0].picture_samples);  // the predicted views are larger
   EXPECT_GT(result->rows[0].error.mssim, 0.75);
   for (size_t i = 1; i < result->rows.size(); ++i) {
     const LayoutRow& r = result->rows[i];
