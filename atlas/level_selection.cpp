@@ -216,9 +216,8 @@ void AdaptiveTarget::on_out_of_memory() {
 }
 
 void AdaptiveTarget::on_quiet_frame() {
-  constexpr int kPatienceFrames = 90;  // 3 s at the usual server rate
   constexpr double kGrowth = 0.01, kMaxShare = 0.95;
-  if (++quiet_frames_ < kPatienceFrames) return;
+  if (++quiet_frames_ < patience_frames_) return;
   share_ = std::min(kMaxShare, share_ + kGrowth);
   quiet_frames_ = 0;
 }

@@ -77,8 +77,9 @@ class BiasFollower {
 // The target S, calibrated by experience (thesis 3.5): memory that ran out shrinks it, quiet time grows it.
 class AdaptiveTarget {
  public:
-  explicit AdaptiveTarget(double atlas_texels, double share = 0.8)
-      : atlas_texels_(atlas_texels), share_(share) {}
+  // `patience_frames`: so many quiet ones for each growth.
+  explicit AdaptiveTarget(double atlas_texels, double share = 0.8, int patience_frames = 90)
+      : atlas_texels_(atlas_texels), share_(share), patience_frames_(patience_frames) {}
   double texels() const { return share_ * atlas_texels_; }
   void on_out_of_memory();
   void on_quiet_frame();
@@ -86,6 +87,7 @@ class AdaptiveTarget {
  private:
   double atlas_texels_;
   double share_;
+  int patience_frames_;
   int quiet_frames_ = 0;
 };
 

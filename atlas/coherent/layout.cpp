@@ -12,6 +12,7 @@ namespace {
 
 constexpr uint32_t kMaxSide = 8192;      // texels
 constexpr double kFirstTarget = 0.88;    // share of the atlas
+constexpr int kPatienceFrames = 15;      // until it grows by a hundredth: what grows with it is little
 constexpr uint64_t kStages = 16;         // of re-placing the atlas: a frame moves at most this part of it
 constexpr uint64_t kGentleStages = 256;  // likewise, while all have a place
 constexpr float kFullest = 0.75f;        // slabs with a larger share in use are not worth emptying
@@ -62,7 +63,7 @@ struct Layout::Impl {
         settings(l),
         traits(s),
         slabs(l.width, l.height),
-        target(l.width * double(l.height), kFirstTarget),
+        target(l.width * double(l.height), kFirstTarget, kPatienceFrames),
         most(most_sides(l.width, l.height)) {}
 
   struct Growth {

@@ -353,5 +353,15 @@ TEST(AdaptiveTarget, RunningOutRestartsTheQuietTime) {
   }
 }
 
+TEST(AdaptiveTarget, GrowsOnceForEachPatience) {
+  for (const int patience : {1, 15, 90}) {
+    AdaptiveTarget target(1000, 0.5, patience);
+    for (int frame = 1; frame <= 4 * patience; ++frame) {
+      target.on_quiet_frame();
+      EXPECT_NEAR(target.texels(), 500 + 10 * (frame / patience), 1e-6) << patience << ", frame " << frame;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tessera::atlas
