@@ -77,7 +77,7 @@ class BiasFollower {
 // The target S, calibrated by experience (thesis 3.5): memory that ran out shrinks it, quiet time grows it.
 class AdaptiveTarget {
  public:
-  // `patience_frames`: so many quiet ones for each growth.
+  // `patience_frames`: so many quiet ones for each hundredth of the atlas that it grows by.
   explicit AdaptiveTarget(double atlas_texels, double share = 0.8, int patience_frames = 90)
       : atlas_texels_(atlas_texels), share_(share), patience_frames_(patience_frames) {}
   double texels() const { return share_ * atlas_texels_; }
