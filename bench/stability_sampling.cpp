@@ -60,6 +60,19 @@ Placement l_placement(scene::PatchId patch, uint32_t triangle, int level, bool t
   return p;
 }
 
+Placement halves_placement(int across, int along, int foot, int apex, bool turned) {
+  Placement p{.patch = 0, .part = atlas::part_of(0), .kind = atlas::PlacementKind::halves};
+  p.halves.apex = static_cast<uint8_t>(apex);
+  p.halves.foot = static_cast<uint8_t>(foot);
+  p.halves.across = static_cast<uint8_t>(across);
+  for (int half = 0; half < 2; ++half)
+    p.halves.half[half] = {.x = 5,
+                           .y = static_cast<uint16_t>(kAtlasSide / 2 * half),
+                           .along = static_cast<uint16_t>(along),
+                           .turned = turned};
+  return p;
+}
+
 Placement block_placement(scene::PatchId patch, uint32_t width, uint32_t height, uint16_t x = 0,
                           bool transposed = false) {
   Placement p{.patch = patch, .kind = atlas::PlacementKind::block, .x = x};
@@ -102,6 +115,37 @@ StatusOr<Measures> every_l(const StabilityContext& context) {
       {"colour, any level, of its bound", of_bound, 1, "a sixth of a step of the level, where it is folded"},
       {"colour, levels 16 to 64", high, l_bound(16), "a sixth of a step of level 16"},
       {"holes, any level", all.holes, 0, "levels change samples, not geometry"}};
+}
+
+// Samples lie on an even grid, so nothing is off but by the curve between two of them, unless those beyond
+// the third side, up to a step away, are nearly black, where it bends most, or would have to be darker.
+double halves_bound(int steps) {
+  constexpr int kDarkSteps = 3;
+  return (steps > kDarkSteps ? 0 : kRange / (2 * steps)) + kCurve / (steps * steps) + kRounding;
+}
+
+StatusOr<Measures> every_half(const StabilityContext& context) {
+  TESSERA_ASSIGN_OR_RETURN(HandPlaced hand, HandPlaced::create(context, lone_triangle()));
+  PictureErrors all{.covered = 1};
+  double of_bound = 0, fine = 0;
+  const auto try_halves = [&](int across, int along, int foot, int apex) -> Status {
+    const bool turned = (across + along + foot + apex) % 2 == 1;
+    TESSERA_ASSIGN_OR_RETURN(const PictureErrors errors,
+                             hand.errors({halves_placement(across, along, foot, apex, turned)}));
+    all = worst(all, errors);
+    of_bound = std::max(of_bound, errors.color / halves_bound(std::min(across, along)));
+    if (std::min(across, along) >= 16) fine = std::max(fine, errors.color);
+    return absl::OkStatus();
+  };
+  for (const int across : {1, 2, 3, 5, 8, 16, 33, 64, 127, 128})
+    for (const int along : {1, 2, 3, 7, 31, 100, 255, 500})
+      for (const int foot : {0, 13, 31, 63})
+        for (int apex = 0; apex < 3; ++apex) TESSERA_RETURN_IF_ERROR(try_halves(across, along, foot, apex));
+  return Measures{
+      {"colour, any halves, of its bound", of_bound, 1,
+       "sRGB's curve between samples; up to 3 intervals half a step, where they reach black"},
+      {"colour, 16 and more intervals", fine, halves_bound(16), "rounding, and sRGB's curve between samples"},
+      {"holes, any halves", all.holes, 0, "halves change samples, not geometry"}};
 }
 
 StatusOr<Measures> every_block(const StabilityContext& context) {
@@ -225,6 +269,9 @@ std::vector<StabilityCase> sampling_stability_cases() {
   std::vector<StabilityCase> cases = {
       {"sampling", "every-l-level", "a triangle with an L of each level from 1 to 64, upright and turned",
        kAsTruth, every_l},
+      {"sampling", "every-half",
+       "a triangle as two halves of 1x1 to 128x500 intervals, from each corner, upright and turned", kAsTruth,
+       every_half},
       {"sampling", "every-block", "two triangles with each block from 2x2 to 256x256, and even ones",
        kAsTruth, every_block},
       {"sampling", "level-changes", "13 frames towards a wall and back, a third a frame", kAsTruth,

@@ -1,5 +1,4 @@
-// What the client knows of the scene, in the form its GPU reads: one 32-byte record a triangle
-// (docs/protocol.md).
+// What the client knows of the scene, in the form its GPU reads: one 32-byte record a triangle.
 #pragma once
 
 #include <array>
@@ -15,16 +14,14 @@ namespace tessera::client {
 // Two texels of four numbers. Fields by bit, least significant first:
 //   vertices: ids of the three corners;  object (24) | corner kind (3) | transposed | masked | reversed |
 //   single colour (1)
-//   shape:    block:  x (16) | y (16);  width (16) | height (16);  spacing codes of the three corners (8
-//   each);  0
-//             L:      x / 2 (12) | y / 2 (12) | level - 1 (6) | turned | split;  splits (8) | next y / 2
-//             (12), if
-//                     split;  spacing as above;  0
-//             halves: x (13) | y / 2 (12) | turned | apex (2), of half 0;  x (13) | y / 2 (12) | turned |
-//             foot (6),
-//                     of half 1;  spacing as above;  across - 1 (7) | along - 1 (10), half 0 | along - 1
-//                     (10), half 1
-//             colour: 0xBBGGRR;  0;  0;  0
+//   shape:
+//     block:  x (16) | y (16);  width (16) | height (16);  spacing codes of the three corners (8 each);  0
+//     L:      x / 2 (12) | y / 2 (12) | level - 1 (6) | turned | split;
+//             splits (8) | next y / 2 (12), if split;  spacing as above;  0
+//     halves: x (13) | y / 2 (12) | turned | apex (2), of half 0;
+//             x (13) | y / 2 (12) | turned | foot (6), of half 1;
+//             spacing as above;  across - 1 (7) | along - 1 (10), half 0 | along - 1 (10), half 1
+//     colour: 0xBBGGRR;  0;  0;  0
 // Corner kind: 0 = lone triangle; 1, 2 = of a pair; 3, 4, 5 = of three; 6 = an L; 7 = halves. It belongs to
 // the stored order of the vertices. Reversed: the corners are visited in the order 0, 2, 1, which undoes the
 // winding of a mirrored object; vertices, block coordinates and spacing swap together, so the corner kind

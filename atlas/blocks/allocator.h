@@ -1,4 +1,4 @@
-// The three-phase block allocator (thesis 3.4, algorithms 1-3, with the corrections of docs/method.md):
+// The three-phase block allocator (thesis 3.4, algorithms 1-3; allocator.cpp says where they are corrected):
 // superblocks of columns of blocks. Request frees and counts, provisioning draws superblocks a column width,
 // assignment hands out blocks. In each phase blocks are either freed or allocated, never both, so that
 // gpu_allocator.h can run it lock-free with the same arrays; this one runs on one CPU thread.

@@ -336,6 +336,33 @@ TEST_F(CrowdedLayoutTest, ResetsMoveABoundedShareAFrame) {
   EXPECT_GT(layout_->stats().resets_total, 0u);
 }
 
+// But for want of memory a reset begins only above the mark, and above a lower one it begins sooner.
+TEST_F(CrowdedLayoutTest, TheHighWaterMarkSaysWhenResetsBegin) {
+  const scene::Scene scene = make_scene(kPatches);
+  std::vector<VisiblePatches> frames;
+  for (int frame = 0; frame < 200; ++frame) frames.push_back(next(1, frame == 0 ? 50 : 4));
+  constexpr float kSuperblocks = 64;
+  std::vector<uint32_t> resets;
+  for (const float mark : {0.4f, 0.7f, 0.9f, 1.0f}) {
+    LayoutSettings settings = settings_;
+    settings.superblock_log = settings.levels.max_log = 6;
+    settings.high_water = mark;
+    const auto layout = *Layout::create(scene, settings);
+    uint32_t& begun = resets.emplace_back(0);
+    for (const VisiblePatches& visible : frames) {
+      layout->update({visible});
+      const LayoutStats& stats = layout->stats();
+      const bool begins = stats.resets_total > begun;
+      begun = stats.resets_total;
+      if (!begins || stats.colors_out_of_memory > 0 || stats.blocks_halved > 0) continue;
+      EXPECT_GT(1 - static_cast<float>(layout->memory().free_superblocks) / kSuperblocks, mark);
+    }
+  }
+  EXPECT_GT(resets[0], resets[2]);
+  EXPECT_GE(resets[1], resets[2]);
+  EXPECT_EQ(resets[3], 0u);
+}
+
 // What thesis fig. 3.9 shows.
 TEST_F(CrowdedLayoutTest, EachPartThatAStrategyLacksCostsMemory) {
   const scene::Scene scene = make_scene(kPatches);

@@ -193,7 +193,7 @@ TEST_F(SpatialSessionTest, NothingScalesByDefault) {
 std::map<scene::PatchId, uint32_t> texels_of(const Session& session) {
   std::map<scene::PatchId, uint32_t> texels;
   for (const atlas::Placement& p : session.placements())
-    texels[p.patch] = p.kind == atlas::PlacementKind::color ? 1 : static_cast<uint32_t>(p.texels());
+    texels[p.patch] += p.kind == atlas::PlacementKind::color ? 1 : static_cast<uint32_t>(p.texels());
   return texels;
 }
 
@@ -253,12 +253,68 @@ TEST_F(SpatialSessionTest, ABiasOfTwoQuartersTheSamples) {
   EXPECT_NEAR(of(quarter) / of(full), 0.25, 0.05);
 }
 
+// Density is samples an area, so four times the density is four times the samples, in every layout.
+TEST_F(SpatialSessionTest, APriorityOfFourQuadruplesAnObjectsSamples) {
+  const std::shared_ptr<scene::Scene> gallery = scene::make_gallery(0);
+  const auto node_of = [&](scene::PatchId patch) {
+    return gallery->instances[gallery->instance_of(patch)].node;
+  };
+  // The node that has most samples, as those of small patches are rounded; and none below it.
+  const std::vector<TimedPose> poses = walk(from_ms(300));
+  const auto looking = session(without_bias());
+  must(looking->render(input(0, poses)));
+  std::vector<uint32_t> samples_of(gallery->nodes.size());
+  for (const auto& [patch, texels] : texels_of(*looking)) samples_of[node_of(patch)] += texels;
+  for (const scene::Node& node : gallery->nodes)
+    if (node.parent != scene::kNone) samples_of[node.parent] = 0;
+  const auto chosen = static_cast<uint32_t>(std::ranges::max_element(samples_of) - samples_of.begin());
+  gallery->nodes[chosen].name = "chosen";
+  const std::shared_ptr<SharedScene> named = must(SharedScene::create(device_, gallery));
+
+  for (const atlas::LayoutKind kind :
+       {atlas::LayoutKind::blocks, atlas::LayoutKind::coherent, atlas::LayoutKind::tessellated}) {
+    const auto samples = [&](std::vector<atlas::ObjectPriority> priorities) {
+      SessionSettings settings = without_bias();
+      settings.layout.kind = kind;
+      settings.density.priorities = std::move(priorities);
+      const auto rendered = must(Session::create(named, settings));
+      must(rendered->render(input(0, poses)));
+      std::array<double, 2> sums{};  // of the others, of the chosen one
+      for (const auto& [patch, texels] : texels_of(*rendered))
+        sums[node_of(patch) == chosen ? 1 : 0] += texels;
+      return sums;
+    };
+    const auto plain = samples({}), preferred = samples({{"chosen", 4}});
+    EXPECT_EQ(preferred[0], plain[0]) << atlas::kLayoutNames[static_cast<size_t>(kind)];
+    EXPECT_NEAR(preferred[1] / plain[1], 4, 0.8) << atlas::kLayoutNames[static_cast<size_t>(kind)];
+  }
+}
+
 TEST_F(SpatialSessionTest, AnUnknownObjectIsRefused) {
   SessionSettings settings = gallery_settings();
   settings.density.priorities = {{"no such thing", 2}};
   const auto refused = Session::create(scene_, settings);
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(refused.status().message()), testing::HasSubstr("no such thing"));
+}
+
+// TSS sends 4 bytes an L and 16 two halves, and a byte for each of the two w ratios. A first frame places
+// all.
+TEST_F(SpatialSessionTest, PlacedTrianglesTakeNoMoreBitsThanInThePaper) {
+  SessionSettings settings = gallery_settings();
+  settings.layout = atlas::layout_settings(atlas::LayoutKind::tessellated, 1024, 512);
+  const auto rendered = session(settings);
+  const std::vector<TimedPose> poses = walk(from_ms(300));
+  const Frame frame = must(rendered->render(input(0, poses)));
+  const atlas::LayoutStats& placed = frame.stats.layout;
+  const uint32_t ls = placed.blocks - placed.halves;
+  EXPECT_GT(ls, 100u);
+  EXPECT_GT(placed.halves, 100u);
+  // Colours count for nothing: the paper has none.
+  const double paper_bits = 8.0 * (6 * ls + 18 * placed.halves);
+  const auto bits = static_cast<double>(frame.stats.meta_bits.placements);
+  EXPECT_LT(bits, paper_bits);
+  std::printf("%.2f of the paper's bits: %u Ls, %u pairs of halves\n", bits / paper_bits, ls, placed.halves);
 }
 
 }  // namespace

@@ -62,11 +62,15 @@ void ask_pair_positions(List& list) {
   }
 }
 
+// Every count of samples; of the larger ones every so manyth vertex, others for each count.
 void ask_ids(List& list) {
-  for (int count = 3; count <= kMaxTessellationVertices; count += count < 100 ? 1 : 61) {
+  constexpr size_t kVertices = 70;
+  for (int count = 3; count <= kMaxTessellationVertices; ++count) {
     const TessellationLevels levels = tessellation_levels(count);
-    for (const vec3& p : perturbed(tessellated(levels), levels.inner, 1))
-      list.ask(ivec4(levels.outer, levels.inner), p);
+    const std::vector<vec3> points = perturbed(tessellated(levels), levels.inner, 1);
+    const size_t step = std::max<size_t>(1, points.size() / kVertices);
+    for (size_t i = static_cast<size_t>(count) % step; i < points.size(); i += step)
+      list.ask(ivec4(levels.outer, levels.inner), points[i]);
   }
 }
 
@@ -137,6 +141,26 @@ void ask_half_texels(List& list) {
   for (int i = 0; i < 2000; ++i) list.ask(ivec4(i % 2, 1 + i % 128, 1 + i % 1000, i % 90 | (i % 70) << 7));
 }
 
+void ask_half_points(List& list) {
+  for (int foot = 0; foot < 64; ++foot) {
+    for (int i = 0; i < 500; ++i) {
+      const vec3 p = list.point();
+      list.ask(ivec4(foot, 1 + i % kMaxHalfWidth, 1 + 7 * i % kMaxHalfLength, i % 2), vec4(p.y, p.z, 0, 0));
+    }
+  }
+}
+
+void ask_half_weights(List& list) {
+  for (int foot = 0; foot < 64; ++foot) {
+    for (int i = 0; i < 500; ++i) {
+      const int across = 1 + i % kMaxHalfWidth, along = 1 + 7 * i % kMaxHalfLength;
+      const ivec2 stairs = half_staircase(across, along);
+      const ivec2 at = staircase_position(13 * i % staircase_samples(stairs), stairs);
+      list.ask(ivec4(foot, across, along, at.x | at.y << 10 | i % 2 << 20), vec4(i / 2 % 2, 0, 0, 0));
+    }
+  }
+}
+
 }  // namespace
 
 int function_count() {
@@ -145,18 +169,20 @@ int function_count() {
 
 const char* function_name(int function) {
   constexpr const char* kNames[kFunctions] = {
-      "levels",    "l_texels",    "l_position",  "l_pair_owner", "l_pair_position", "oversampling_id",
-      "staircase", "to_surface",  "to_grid",     "ratio_code",   "block_point",     "block_corner",
-      "l_sample",  "split_point", "split_place", "l_pair_place", "half_texel"};
+      "levels",          "l_texels",     "l_position", "l_pair_owner", "l_pair_position",
+      "oversampling_id", "staircase",    "to_surface", "to_grid",      "ratio_code",
+      "block_point",     "block_corner", "l_sample",   "split_point",  "split_place",
+      "l_pair_place",    "half_texel",   "half_point", "half_weights"};
   return kNames[function];
 }
 
 std::vector<Question> questions(int function) {
   using Ask = void (*)(List&);
-  constexpr Ask kAsk[kFunctions] = {
-      ask_levels,     ask_texels,       ask_positions,    ask_pair_texels, ask_pair_positions, ask_ids,
-      ask_staircases, ask_perspective,  ask_perspective,  ask_ratios,      ask_blocks,         ask_corners,
-      ask_samples,    ask_split_points, ask_split_places, ask_pair_places, ask_half_texels};
+  constexpr Ask kAsk[kFunctions] = {ask_levels,         ask_texels,       ask_positions,    ask_pair_texels,
+                                    ask_pair_positions, ask_ids,          ask_staircases,   ask_perspective,
+                                    ask_perspective,    ask_ratios,       ask_blocks,       ask_corners,
+                                    ask_samples,        ask_split_points, ask_split_places, ask_pair_places,
+                                    ask_half_texels,    ask_half_points,  ask_half_weights};
   List list;
   kAsk[function](list);
   return list.take();

@@ -9,7 +9,7 @@
 
 const int kLevels = 0, kTexels = 1, kPosition = 2, kPairTexel = 3, kPairPosition = 4, kSampleId = 5, kStaircase = 6, kSurface = 7,
           kGrid = 8, kRatio = 9, kBlockPoint = 10, kBlockCorner = 11, kSample = 12, kSplitPoint = 13, kSplitPlace = 14, kPairPlace = 15, kHalfTexel = 16,
-          kFunctions = 17;
+          kHalfPoint = 17, kHalfWeights = 18, kFunctions = 19;
 
 struct Answer {
   ivec4 n;
@@ -79,6 +79,7 @@ Answer evaluate(int function, ivec4 n, vec4 x) {
   } else if (function == kSplitPoint) {
     SplitPoint point = split_point(lambda, n.x);
     a.n.x = point.index;
+    a.x = vec4(point.lambda.x, point.lambda.y, point.lambda.z, 0.0f);
   } else if (function == kSplitPlace) {
     SplitPlace place = split_place(n.y, n.x);
     a.x = vec4(place.corner.x, place.corner.y, place.scale, 0.0f);
@@ -90,6 +91,15 @@ Answer evaluate(int function, ivec4 n, vec4 x) {
     ivec2 texel = half_texel(ivec2(n.w & 127, n.w >> 7), size, n.x == 1);
     ivec2 back = half_sample(texel, size, n.x == 1);
     a.n = ivec4(texel.x, texel.y, back.x, back.y);
+  } else if (function == kHalfPoint) {
+    HalfPoint point = half_point(x.x, x.y, foot_from_code(n.x));
+    vec2 at = half_position(point, n.y, n.z, n.w == 1);
+    a.n.x = point.half_number;
+    a.x = vec4(point.up, point.out_along, at.x, at.y);
+  } else if (function == kHalfWeights) {
+    HalfSample at = half_weights(ivec2(n.w & 1023, n.w >> 10 & 1023), n.y, n.z, n.w >> 20, foot_from_code(n.x));
+    a.x = x.x < 0.5f ? vec4(at.weights.x, at.weights.y, at.step_along.x, at.step_along.y)
+                     : vec4(at.weights.x, at.weights.y, at.step_up.x, at.step_up.y);
   }
   return a;
 }
