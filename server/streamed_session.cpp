@@ -223,6 +223,7 @@ void StreamedSession::count(const Frame& frame) {
   const std::lock_guard lock(mutex_);
   stats_.key_frames += frame.atlas.key_frame ? 1 : 0;
   stats_.meta_bytes += frame.meta.size();
+  stats_.layout = frame.stats.layout;
   std::erase_if(sent_, [&](const auto& s) { return s.first <= now - kRateWindowNs; });
   sent_.emplace_back(now, frame.meta.size() + frame.atlas.bytes.size());
 }
@@ -359,6 +360,7 @@ StreamedSessionStats StreamedSession::stats() const {
   const std::lock_guard lock(mutex_);
   StreamedSessionStats stats = stats_;
   stats.connected = connection_ != nullptr;
+  stats.atlas_texels = uint64_t{settings_.layout.width} * settings_.layout.height;
   for (const auto& [when, bytes] : sent_)
     if (when > clock_.now() - kRateWindowNs) stats.bitrate_bps += 8 * static_cast<double>(bytes);
   stats.media += media_->sender_stats(id_).value_or(transport::RtpSenderStats());

@@ -166,8 +166,6 @@ void Layout::Impl::follow_bias(const scene::VisiblePatches& visible) {
     ideal_areas.push_back(needs.back().area);
   }
   stats.bias = bias.follow(select_bias(ideal_areas, target.texels(), settings.levels));
-  stats.ideal_texels = 0;
-  for (const float area : ideal_areas) stats.ideal_texels += area;
 }
 
 // Merges the visible patches with those of the last frame.
@@ -271,9 +269,8 @@ void Layout::Impl::allocate_moving() {
 
 void Layout::Impl::count(const LayoutDelta& delta) {
   const AllocatorStats memory = allocator.stats();
-  stats.target_share = target.texels() / static_cast<double>(memory.capacity_texels);
   stats.used_texels = memory.used_texels;
-  stats.stack_texels = memory.stack_texels;
+  stats.fragmented_texels = memory.stack_texels + memory.inaccessible_texels;
   const auto is_color = [](const Placement& p) { return p.kind == PlacementKind::color; };
   stats.colors = static_cast<uint32_t>(std::count_if(now.placements.begin(), now.placements.end(), is_color));
   stats.blocks = static_cast<uint32_t>(now.placements.size()) - stats.colors;

@@ -33,6 +33,8 @@ Status check(const LayoutSettings& s) {
       return absl::InvalidArgumentError(absl::StrFormat(
           "atlas layout: size %dx%d, both sides must be even, 2 to %d", s.width, s.height, kMaxSide));
   }
+  if (!(s.high_water > 0 && s.high_water <= 1))
+    return absl::InvalidArgumentError("atlas layout: high_water must be a share in (0, 1]");
   return absl::OkStatus();
 }
 
@@ -154,11 +156,9 @@ void Layout::Impl::fit_first_frame(const LayoutInput& input) {
 
 void Layout::Impl::follow_bias(const scene::VisiblePatches& visible) {
   wanted.clear();
-  stats.ideal_texels = 0;
   for (const scene::VisiblePatch& v : visible) {
     const PatchTraits t = traits[v.patch];
     wanted.push_back({rectangle_need(v.footprint, t.triangle_count), t.masked});
-    stats.ideal_texels += wanted.back().need.area * (t.masked ? 2 : 1);
   }
   needed_bias = select_bias(wanted, target.texels(), settings.levels, most, needed_bias);
   stats.bias = bias.follow(needed_bias);
@@ -317,9 +317,8 @@ void Layout::Impl::allocate() {
 
 void Layout::Impl::count(const LayoutDelta& delta) {
   const SlabStats memory = slabs.stats();
-  stats.target_share = target.texels() / static_cast<double>(memory.capacity_texels);
   stats.used_texels = memory.used_texels;
-  stats.stack_texels = memory.slab_texels - memory.used_texels;
+  stats.fragmented_texels = memory.slab_texels - memory.used_texels;
   const auto is_color = [](const Placement& p) { return p.kind == PlacementKind::color; };
   stats.colors = static_cast<uint32_t>(std::count_if(now.begin(), now.end(), is_color));
   stats.blocks = static_cast<uint32_t>(now.size()) - stats.colors;

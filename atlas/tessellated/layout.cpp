@@ -84,7 +84,6 @@ LayoutDelta Layout::Impl::update(const LayoutInput& input) {
 void Layout::Impl::look(const LayoutInput& input) {
   needs.clear();
   blanks.clear();
-  stats.ideal_texels = 0;
   std::array<SeenTriangle, 3> seen;
   uint32_t instance = 0;
   for (const scene::VisiblePatch& v : input.visible) {
@@ -98,7 +97,6 @@ void Layout::Impl::look(const LayoutInput& input) {
     for (uint32_t t = 0; t < triangles; ++t) {
       seen[t].need.masked = masked;
       needs.push_back(seen[t].need);
-      stats.ideal_texels += seen[t].need.area * (masked ? 2 : 1);
       Placement& blank =
           blanks.emplace_back(Placement{.patch = v.patch, .part = part_of(t), .masked = masked});
       std::copy(seen[t].spacing.begin(), seen[t].spacing.end(), blank.spacing.begin());
@@ -197,7 +195,6 @@ void Layout::Impl::fall_back(uint32_t index) {
 }
 
 void Layout::Impl::count(const LayoutDelta& delta) {
-  stats.target_share = kTargetShare;
   stats.used_texels = 0;
   stats.colors = stats.halves = 0;
   for (const Placement& p : now) {
