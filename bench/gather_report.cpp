@@ -28,7 +28,8 @@ json to_json(const GatherRow& row) {
               {"samples", row.samples},
               {"ns_per_sample", to_json(row.ns)},
               {"ratio", to_json(row.ratio)},
-              {"ratio_to_shading_pass", to_json(row.ratio_shading)}};
+              {"ratio_to_shading_pass", to_json(row.ratio_shading)},
+              {"list_ms", to_json(row.list_ms)}};
   if (row.slant > 0) out["slant"] = row.slant;
   if (row.outside) out["outside"] = *row.outside;
   if (row.empty) out["empty"] = *row.empty;
@@ -49,6 +50,10 @@ json to_json(const shading::GatherCosts& costs) {
 }
 
 std::string note_of(const GatherRow& row) {
+  if (row.group == "layouts") {
+    const std::string lists = absl::StrFormat("lists %.2f ms", row.list_ms.median);
+    return row.outside ? absl::StrFormat("%s, %.1f%% outside", lists, 100 * *row.outside) : lists;
+  }
   if (row.outside) return absl::StrFormat("%.1f%% outside", 100 * *row.outside);
   return row.empty ? absl::StrFormat("%.1f%% of the tiles empty", 100 * *row.empty) : "";
 }

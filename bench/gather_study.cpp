@@ -45,10 +45,13 @@ struct ForwardTime {
 };
 
 // One row in the making: a load, and how to shade it.
+struct LoadTime {
+  double gpu_ms = 0, list_ms = 0;
+};
 struct Case {
   GatherRow row;
-  std::function<StatusOr<double>()> shade;  // ms
-  std::vector<double> ns, ratio, ratio_shading;
+  std::function<StatusOr<LoadTime>()> shade;
+  std::vector<double> ns, ratio, ratio_shading, list_ms;
 };
 
 // Everything of one run.
@@ -64,7 +67,7 @@ class Study {
   Status set_up();
   Status look();
   StatusOr<ForwardTime> forward();
-  StatusOr<double> gather(const std::vector<Placement>& load, GatherPath path);
+  StatusOr<LoadTime> gather(const std::vector<Placement>& load, GatherPath path);
   Status add_shapes();
   Status add_layouts();
   Status add_texels();
@@ -145,13 +148,14 @@ StatusOr<ForwardTime> Study::forward() {
   return ForwardTime{interval_ms(*device_, "reference depth"), interval_ms(*device_, "reference color")};
 }
 
-StatusOr<double> Study::gather(const std::vector<Placement>& load, GatherPath path) {
+StatusOr<LoadTime> Study::gather(const std::vector<Placement>& load, GatherPath path) {
   TESSERA_RETURN_IF_ERROR(
       gather_->choose(path == GatherPath::automatic ? shared_->gather_choice() : shading::only(path)));
   gpu::Commands commands = device_->begin();
   TESSERA_RETURN_IF_ERROR(gather_->record(commands, *instant_, view_, load));
   TESSERA_RETURN_IF_ERROR(device_->run(std::move(commands)));
-  return gather_->stats().gpu_ms;
+  const shading::GatherStats& stats = gather_->stats();
+  return LoadTime{stats.gpu_ms, stats.list_ms};
 }
 
 // A case for each path.
@@ -262,10 +266,10 @@ Status Study::add_texels() {
     row.samples += texture_->samples(tiles->back());
   }
   row.empty = 1 - static_cast<double>(row.samples) / static_cast<double>(count * kTexelTileTexels);
-  cases_.push_back({.row = row, .shade = [this, tiles]() -> StatusOr<double> {
+  cases_.push_back({.row = row, .shade = [this, tiles]() -> StatusOr<LoadTime> {
                       TESSERA_ASSIGN_OR_RETURN(const ShadedTexels shaded,
                                                texel_shader_->shade(*instant_, view_, *tiles));
-                      return shaded.gpu_ms;
+                      return LoadTime{.gpu_ms = shaded.gpu_ms};
                     }});
   return absl::OkStatus();
 }
@@ -273,7 +277,7 @@ Status Study::add_texels() {
 // A forward picture before and after each load: ratios are to the mean of the two, so that what drifts on the
 // machine drifts for both.
 Status Study::measure_round(bool counts) {
-  std::vector<double> case_ms;
+  std::vector<LoadTime> times;
   std::vector<ForwardTime> before;  // each load, and after the last
   std::vector<size_t> load_of;
   const auto look_forward = [&]() -> Status {
@@ -286,7 +290,7 @@ Status Study::measure_round(bool counts) {
         i == 0 || row.group != cases_[i - 1].row.group || row.name != cases_[i - 1].row.name;
     if (new_load) TESSERA_RETURN_IF_ERROR(look_forward());
     load_of.push_back(before.size() - 1);
-    TESSERA_ASSIGN_OR_RETURN(case_ms.emplace_back(), cases_[i].shade());
+    TESSERA_ASSIGN_OR_RETURN(times.emplace_back(), cases_[i].shade());
     progress_.advance();
   }
   TESSERA_RETURN_IF_ERROR(look_forward());
@@ -300,8 +304,9 @@ Status Study::measure_round(bool counts) {
   for (size_t i = 0; i < cases_.size(); ++i) {
     Case& c = cases_[i];
     const size_t at = first + load_of[i];
-    const double ns = 1e6 * case_ms[i] / static_cast<double>(std::max<uint64_t>(1, c.row.samples));
+    const double ns = 1e6 * times[i].gpu_ms / static_cast<double>(std::max<uint64_t>(1, c.row.samples));
     c.ns.push_back(ns);
+    c.list_ms.push_back(times[i].list_ms);
     c.ratio.push_back(2 * ns / (forward_ns_[at] + forward_ns_[at + 1]));
     c.ratio_shading.push_back(2 * ns / (shading_ns_[at] + shading_ns_[at + 1]));
   }
@@ -323,6 +328,7 @@ Status Study::measure_costs() {
 void Study::finish() {
   for (Case& c : cases_) {
     c.row.ns = spread_of(std::move(c.ns));
+    c.row.list_ms = spread_of(std::move(c.list_ms));
     c.row.ratio = spread_of(std::move(c.ratio));
     c.row.ratio_shading = spread_of(std::move(c.ratio_shading));
     result_.rows.push_back(std::move(c.row));

@@ -46,6 +46,7 @@ struct GatherRow {
   Spread ns;                // a sample
   Spread ratio;  // to forward shading, depth and shading pass, in the same round, just before and after
   Spread ratio_shading;           // to its shading pass alone
+  Spread list_ms;                 // the CPU's work lists for all of the load; none for texel shading
   std::optional<double> outside;  // halves: share of the samples outside their triangles
   std::optional<double> empty;    // texel shading: share of its tiles' texels that show nothing
 };

@@ -29,7 +29,8 @@ void for_each_option(Settings& s, Visitor&& visit) {
   visit("Server", "bitrate-mbps", s.bitrate_mbps, "atlas and meta together");
   visit("Server", "pvs", s.pvs, "prediction of the potentially visible set");
   visit("Server", "gather", s.gather,
-        "passes that shade the atlas; auto: those that cost least on the device");
+        "passes that shade the atlas; auto: the cheapest by shape and size, measured while a scene loads (a "
+        "software device: by a table)");
   visit("Server", "device", s.device, "Vulkan device: cpu, an index, or part of its name");
   visit("Server", "validation", s.validation, "load the Vulkan validation layer, which logs misuse");
   visit("Network", "delay-ms", s.delay_ms, "one way");

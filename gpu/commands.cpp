@@ -187,13 +187,6 @@ void Commands::dispatch(uint32_t x, uint32_t y, uint32_t z) {
   impl_->cmd().dispatch(x, y, z);
 }
 
-void Commands::dispatch_indirect(const Buffer& buffer, uint64_t offset) {
-  impl_->fail(check_range(buffer, offset, sizeof(VkDispatchIndirectCommand), "dispatch_indirect"));
-  if (!ready_to_dispatch(*impl_, "dispatch_indirect")) return;
-  ++impl_->core->dispatches;
-  impl_->cmd().dispatchIndirect(*buffer.impl().buffer, offset);
-}
-
 void Commands::begin_rendering(const RenderTarget& target) {
   if (!impl_->ok()) return;
   if (impl_->rendering) return impl_->fail(absl::FailedPreconditionError("begin_rendering: already begun"));

@@ -52,7 +52,6 @@ class Commands {
   // Compute. Bind pipeline first; `groups[i]` is set i; push constants are copied.
   void bind(const ComputePipeline& pipeline, std::initializer_list<const BindGroup*> groups);
   void dispatch(uint32_t x, uint32_t y = 1, uint32_t z = 1);
-  void dispatch_indirect(const Buffer& buffer, uint64_t offset);
 
   // Raster and tessellation, between begin_rendering and end_rendering. The viewport covers the target
   // (negative height: +Y up). Tessellation alone needs no attachments.

@@ -61,7 +61,8 @@ void add_options(CLI::App& app, DaemonSettings& s, LogSettings& log) {
   std::vector<std::string> paths;
   for (const std::string_view path : shading::kGatherPathNames) paths.emplace_back(path);
   add("Rendering", "gather", s.gather,
-      "passes that shade the atlas; auto: those that cost least on the device")
+      "passes that shade the atlas; auto: the cheapest by shape and size, measured while a scene loads (a "
+      "software device: by a table)")
       ->check(CLI::IsMember(paths));
   add("Logs", "log", log.level, "level on standard error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "base/time.h"
 #include "shading/features.h"
 #include "shading/gather_pass.h"
 #include "shading/gather_work.h"
@@ -215,9 +216,12 @@ Status Gather::choose(const GatherChoice& choice) {
 
 Status Gather::record(gpu::Commands& commands, const scene::SceneInstant& instant, const View& viewer,
                       std::span<const atlas::Placement> placements) {
+  const SteadyClock clock;
+  const TimeNs begin = clock.now();
   const GatherLimits limits{impl_->settings.width, impl_->settings.height, impl_->choice};
   TESSERA_ASSIGN_OR_RETURN(const GatherWork work, build_gather_work(impl_->scene, placements, limits));
   TESSERA_RETURN_IF_ERROR(impl_->upload(work));
+  impl_->stats.list_ms = to_ms(clock.now() - begin);
   PassPush push = pass_of(viewer, instant.origin());
   push.width = impl_->settings.width;
   push.height = impl_->settings.height;

@@ -28,6 +28,7 @@ struct GatherStats {
   uint64_t half_samples_outside = 0;  // and of those, outside their triangles
   uint64_t raster_blocks = 0, compute_blocks = 0;
   uint64_t tessellated_blocks = 0;  // triangles that went to the tessellator
+  double list_ms = 0;               // on the CPU: work lists and start tables made and written
   double gpu_ms = 0;
 };
 

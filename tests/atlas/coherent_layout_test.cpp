@@ -85,10 +85,13 @@ VisiblePatches rectangles(uint32_t count, float u, float v) {
   return visible;
 }
 
-TEST_F(CoherentLayout, RefusesOddAndHugeAtlases) {
+TEST_F(CoherentLayout, RefusesOddAndHugeAtlasesAndMarksOutOfRange) {
   const scene::Scene scene = make_scene(1);
   for (const auto& [width, height] : {std::pair{0u, 256u}, {255u, 256u}, {256u, 8194u}})
     EXPECT_EQ(Layout::create(scene, {.width = width, .height = height}).status().code(),
+              absl::StatusCode::kInvalidArgument);
+  for (const float mark : {0.0f, -1.0f, 1.01f, std::nanf("")})
+    EXPECT_EQ(Layout::create(scene, {.width = 256, .height = 256, .high_water = mark}).status().code(),
               absl::StatusCode::kInvalidArgument);
 }
 

@@ -70,18 +70,6 @@ TEST_F(ComputeTest, RoundTrip) {
   EXPECT_EQ(device().draws_recorded(), 0u);
 }
 
-TEST_F(ComputeTest, IndirectDispatchTakesItsSizeFromTheGpu) {
-  const Buffer values = filled(std::vector<uint32_t>(256, 1));
-  const Buffer size = filled(std::vector<uint32_t>{99, 2, 1, 1});  // the first word is not part of it
-  const BindGroup bound = group(values);
-  Commands commands = device().begin();
-  commands.bind(scale_, {&bound});
-  commands.push(5u);
-  commands.dispatch_indirect(size, 4);
-  run(std::move(commands));
-  for (uint32_t i = 0; i < 256; ++i) EXPECT_EQ(values.as<uint32_t>()[i], i < 128 ? 5u : 1u) << i;
-}
-
 TEST_F(ComputeTest, AnUnsetBindingIsAnErrorNotACrash) {
   const BindGroup unset = value(BindGroup::create(device(), layout_));
   Commands commands = device().begin();
