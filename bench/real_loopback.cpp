@@ -42,6 +42,7 @@ v1::Layout to_proto(atlas::LayoutKind kind) {
 using nlohmann::json;
 
 constexpr std::chrono::milliseconds kPoll{20};
+constexpr std::chrono::seconds kCallTimeout{10};
 constexpr uint32_t kSpareWatchers = 4;  // beside one of each session's frames
 constexpr size_t kLogTail = 2000;       // characters of a failed program's output that are shown
 
@@ -144,6 +145,10 @@ Status RealLoopback::start_daemon() {
 
 Status RealLoopback::describe_daemon() {
   grpc::ClientContext info_context, scenes_context;
+  // The daemon listens, but gRPC 1.51 may give up its first connection all the same (see is_starting() in
+  // client-sdk/tools/controlled_session.cpp). Later calls go over the same channel.
+  info_context.set_wait_for_ready(true);
+  info_context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
   v1::ServerInfo info;
   TESSERA_RETURN_IF_ERROR(to_status(control_->GetServerInfo(&info_context, {}, &info), "GetServerInfo"));
   result_.device = {info.device(), info.driver(), info.software_rendering()};
