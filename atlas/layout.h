@@ -29,7 +29,7 @@ struct LayoutSettings {
   uint32_t width = 2048, height = 1024;  // texels; blocks: multiples of the superblock's side; at most 8192
   uint8_t superblock_log = 8;            // blocks
   // blocks: share of the superblocks in use above which a fragmented atlas is re-placed, in stages; coherent:
-  // of the memory, above which slabs are emptied and nothing grows. In (0, 1].
+  // of the shelves, above which slabs are emptied and what grows takes gaps alone. In (0, 1].
   float high_water = 0.96f;
   float slantedness =
       kDefaultSlantedness;  // tessellated: longest edge over height above which halves are taken
@@ -48,7 +48,7 @@ struct LayoutInput {
 struct LayoutStats {
   float bias = 0;
   uint64_t used_texels = 0;        // in blocks
-  uint64_t fragmented_texels = 0;  // free, but not for every block
+  uint64_t fragmented_texels = 0;  // not in use, nor fit for every block
   uint32_t blocks = 0, colors = 0, colors_out_of_memory = 0;
   uint32_t halves = 0;         // among the blocks: triangles of kind halves
   uint32_t blocks_halved = 0;  // placed in this frame smaller than wished, for want of memory

@@ -60,7 +60,7 @@ Placement l_placement(scene::PatchId patch, uint32_t triangle, int level, bool t
   return p;
 }
 
-Placement halves_placement(int across, int along, int foot, int apex, bool turned) {
+Placement halves_placement(int across, std::array<int, 2> along, int foot, int apex, bool turned) {
   Placement p{.patch = 0, .part = atlas::part_of(0), .kind = atlas::PlacementKind::halves};
   p.halves.apex = static_cast<uint8_t>(apex);
   p.halves.foot = static_cast<uint8_t>(foot);
@@ -68,7 +68,7 @@ Placement halves_placement(int across, int along, int foot, int apex, bool turne
   for (int half = 0; half < 2; ++half)
     p.halves.half[half] = {.x = 5,
                            .y = static_cast<uint16_t>(kAtlasSide / 2 * half),
-                           .along = static_cast<uint16_t>(along),
+                           .along = static_cast<uint16_t>(along[half]),
                            .turned = turned};
   return p;
 }
@@ -128,19 +128,25 @@ StatusOr<Measures> every_half(const StabilityContext& context) {
   TESSERA_ASSIGN_OR_RETURN(HandPlaced hand, HandPlaced::create(context, lone_triangle()));
   PictureErrors all{.covered = 1};
   double of_bound = 0, fine = 0;
-  const auto try_halves = [&](int across, int along, int foot, int apex) -> Status {
-    const bool turned = (across + along + foot + apex) % 2 == 1;
+  const auto try_halves = [&](int across, std::array<int, 2> along, int foot, int apex) -> Status {
+    const bool turned = (across + along[0] + foot + apex) % 2 == 1;
     TESSERA_ASSIGN_OR_RETURN(const PictureErrors errors,
                              hand.errors({halves_placement(across, along, foot, apex, turned)}));
     all = worst(all, errors);
-    of_bound = std::max(of_bound, errors.color / halves_bound(std::min(across, along)));
-    if (std::min(across, along) >= 16) fine = std::max(fine, errors.color);
+    const int least = std::min({across, along[0], along[1]});
+    of_bound = std::max(of_bound, errors.color / halves_bound(least));
+    if (least >= 16) fine = std::max(fine, errors.color);
     return absl::OkStatus();
   };
+  constexpr int kLengths[] = {1, 2, 3, 7, 31, 100, 255, 500};
   for (const int across : {1, 2, 3, 5, 8, 16, 33, 64, 127, 128})
-    for (const int along : {1, 2, 3, 7, 31, 100, 255, 500})
+    for (size_t i = 0; i < std::size(kLengths); ++i)
       for (const int foot : {0, 13, 31, 63})
-        for (int apex = 0; apex < 3; ++apex) TESSERA_RETURN_IF_ERROR(try_halves(across, along, foot, apex));
+        for (int apex = 0; apex < 3; ++apex) {
+          // Two lengths that differ, so that one taken for the other shows.
+          const std::array<int, 2> along{kLengths[i], kLengths[(i + 1) % std::size(kLengths)]};
+          TESSERA_RETURN_IF_ERROR(try_halves(across, along, foot, apex));
+        }
   return Measures{
       {"colour, any halves, of its bound", of_bound, 1,
        "sRGB's curve between samples; up to 3 intervals half a step, where they reach black"},

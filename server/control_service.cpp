@@ -330,7 +330,6 @@ StatusOr<v1::Session> ControlService::describe(uint64_t id) {
   atlas.set_fragmented(stats->share(stats->layout.fragmented_texels));
   atlas.set_bias(stats->layout.bias);
   atlas.set_without_place(stats->layout.colors_out_of_memory);
-  atlas.set_resets(stats->layout.resets_total);
   if (!stats->ended.ok()) session.set_last_client_end(std::string(stats->ended.message()));
   return session;
 }

@@ -112,13 +112,15 @@ void add_each_session(const StreamServerStats& s, std::vector<MetricFamily>& out
   each(gauge("tesserad_session_atlas_used_ratio", "Share of the atlas that holds samples."),
        [](const Stats& x) { return x.share(x.layout.used_texels); });
   each(gauge("tesserad_session_atlas_fragmented_ratio",
-             "Share of the atlas that is free, but not for patches of every size."),
+             "Share of the atlas that neither is in use nor would take patches of every size."),
        [](const Stats& x) { return x.share(x.layout.fragmented_texels); });
-  each(gauge("tesserad_session_atlas_bias",
-             "Log2 of the pixels that share a sample so that the atlas suffices; below 0: samples to spare."),
-       [](const Stats& x) { return x.layout.bias; });
+  each(
+      gauge(
+          "tesserad_session_atlas_bias",
+          "2^-bias samples a pixel are aimed at, before foveation and the like; above 0 the atlas is small."),
+      [](const Stats& x) { return x.layout.bias; });
   each(gauge("tesserad_session_atlas_patches_without_place",
-             "Patches that are a single colour for want of memory in the atlas."),
+             "Patches (triangles, if each is placed) that are a single colour for want of memory."),
        [](const Stats& x) { return x.layout.colors_out_of_memory; });
   each(counter("tesserad_session_frames_sent_total", "Frames rendered and sent, by session."),
        [](const Stats& x) { return x.frames_sent; });

@@ -86,6 +86,7 @@ void StreamedSession::on_closed(const Status& reason) {
   idle_since_ns_ = clock_.now();
   stats_.ended = reason;
   stats_.round_trip_ns = kFirstRoundTripNs;  // the next one comes another way
+  stats_.layout = {};
 }
 
 void StreamedSession::on_bound() {
@@ -223,7 +224,7 @@ void StreamedSession::count(const Frame& frame) {
   const std::lock_guard lock(mutex_);
   stats_.key_frames += frame.atlas.key_frame ? 1 : 0;
   stats_.meta_bytes += frame.meta.size();
-  stats_.layout = frame.stats.layout;
+  if (connection_) stats_.layout = frame.stats.layout;
   std::erase_if(sent_, [&](const auto& s) { return s.first <= now - kRateWindowNs; });
   sent_.emplace_back(now, frame.meta.size() + frame.atlas.bytes.size());
 }

@@ -30,7 +30,7 @@ struct StreamedSessionStats {
   std::optional<transport::PeerReport> peer;  // what the client last reported of the media
   DurationNs round_trip_ns = 0;  // from a pose to the picture that shows its frame, as the client reports it
   Status ended;                  // why the client left, or OK
-  atlas::LayoutStats layout;     // of the last frame
+  atlas::LayoutStats layout;     // of the client's last frame
   uint64_t atlas_texels = 0;     // of the whole atlas
   double share(uint64_t texels) const {
     return atlas_texels == 0 ? 0 : static_cast<double>(texels) / static_cast<double>(atlas_texels);

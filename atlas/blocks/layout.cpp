@@ -270,7 +270,7 @@ void Layout::Impl::allocate_moving() {
 void Layout::Impl::count(const LayoutDelta& delta) {
   const AllocatorStats memory = allocator.stats();
   stats.used_texels = memory.used_texels;
-  stats.fragmented_texels = memory.stack_texels + memory.inaccessible_texels;
+  stats.fragmented_texels = memory.stack_texels + memory.carry_texels + memory.inaccessible_texels;
   const auto is_color = [](const Placement& p) { return p.kind == PlacementKind::color; };
   stats.colors = static_cast<uint32_t>(std::count_if(now.placements.begin(), now.placements.end(), is_color));
   stats.blocks = static_cast<uint32_t>(now.placements.size()) - stats.colors;

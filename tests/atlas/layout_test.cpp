@@ -336,7 +336,7 @@ TEST_F(CrowdedLayoutTest, ResetsMoveABoundedShareAFrame) {
   EXPECT_GT(layout_->stats().resets_total, 0u);
 }
 
-// But for want of memory a reset begins only above the mark, and above a lower one it begins sooner.
+// But for want of memory a reset begins only above the mark, and with a lower one more often.
 TEST_F(CrowdedLayoutTest, TheHighWaterMarkSaysWhenResetsBegin) {
   const scene::Scene scene = make_scene(kPatches);
   std::vector<VisiblePatches> frames;

@@ -110,6 +110,24 @@ TEST_F(Operation, ServerInfoNamesDeviceEncoderAndLimits) {
   EXPECT_EQ(info.limits().max_watchers(), 8u);
 }
 
+TEST_F(Operation, AnAtlasThatIsTooSmallIsTold) {
+  start({.scenes = {"hall=gallery:0"}});
+  const auto watched = [&](const v1::Density& density) {
+    v1::Ticket ticket;
+    EXPECT_TRUE(create("hall", &ticket, 64, density).ok());
+    auto client = connect(ticket);
+    EXPECT_TRUE(client.ok()) << client.status();
+    EXPECT_NE(first_pair(**client), nullptr);
+    return get(ticket.session()).atlas();
+  };
+  EXPECT_GT(watched({}).bias(), 0);
+  v1::Density fixed;
+  fixed.set_bias(-2);
+  const v1::AtlasUse full = watched(fixed);
+  EXPECT_EQ(full.bias(), -2);
+  EXPECT_GT(full.without_place(), 0u);
+}
+
 // Totals never fall when a session ends; its own series go.
 TEST_F(Operation, MetricsCountWhatASessionDoesAndKeepItAfterwards) {
   start({.scenes = {"hall=gallery:0"}});
@@ -139,7 +157,7 @@ TEST_F(Operation, MetricsCountWhatASessionDoesAndKeepItAfterwards) {
   EXPECT_GT(metric("tesserad_session_atlas_used_ratio" + label), 0.1);
   EXPECT_LT(metric("tesserad_session_atlas_fragmented_ratio" + label), 1);
   EXPECT_EQ(metric("tesserad_session_atlas_patches_without_place" + label), 0);
-  EXPECT_FALSE(std::isnan(metric("tesserad_session_atlas_bias" + label)));
+  EXPECT_EQ(metric("tesserad_session_atlas_bias" + label), session.atlas().bias());
 
   ASSERT_TRUE(remove(ticket.session()).ok());
   EXPECT_EQ(metric("tesserad_sessions"), 0);

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
+#include <map>
 #include <set>
 
 #include "scene/procedural.h"
@@ -313,7 +316,7 @@ TEST_F(SpatialSessionTest, PlacedTrianglesTakeNoMoreBitsThanInThePaper) {
   // Colours count for nothing: the paper has none.
   const double paper_bits = 8.0 * (6 * ls + 18 * placed.halves);
   const auto bits = static_cast<double>(frame.stats.meta_bits.placements);
-  EXPECT_LT(bits, paper_bits);
+  EXPECT_LT(bits, 0.5 * paper_bits);
   std::printf("%.2f of the paper's bits: %u Ls, %u pairs of halves\n", bits / paper_bits, ls, placed.halves);
 }
 

@@ -141,11 +141,28 @@ void ask_half_texels(List& list) {
   for (int i = 0; i < 2000; ++i) list.ask(ivec4(i % 2, 1 + i % 128, 1 + i % 1000, i % 90 | (i % 70) << 7));
 }
 
+// Intervals along and across, the most and the fewest among them.
+struct HalfSize {
+  int across, along;
+};
+HalfSize half_size(List& list, int i) {
+  const auto some = [&](int most) {
+    return 1 + static_cast<int>(list.uniform(0, 1) * static_cast<float>(most - 1));
+  };
+  return {i % 8 == 0   ? kMaxHalfWidth
+          : i % 8 == 1 ? 1
+                       : some(kMaxHalfWidth),
+          i % 8 < 3    ? kMaxHalfLength
+          : i % 8 == 3 ? 1
+                       : some(kMaxHalfLength)};
+}
+
 void ask_half_points(List& list) {
   for (int foot = 0; foot < 64; ++foot) {
     for (int i = 0; i < 500; ++i) {
+      const HalfSize size = half_size(list, i);
       const vec3 p = list.point();
-      list.ask(ivec4(foot, 1 + i % kMaxHalfWidth, 1 + 7 * i % kMaxHalfLength, i % 2), vec4(p.y, p.z, 0, 0));
+      list.ask(ivec4(foot, size.across, size.along, i / 8 % 2), vec4(p.y, p.z, 0, 0));
     }
   }
 }
@@ -153,10 +170,12 @@ void ask_half_points(List& list) {
 void ask_half_weights(List& list) {
   for (int foot = 0; foot < 64; ++foot) {
     for (int i = 0; i < 500; ++i) {
-      const int across = 1 + i % kMaxHalfWidth, along = 1 + 7 * i % kMaxHalfLength;
-      const ivec2 stairs = half_staircase(across, along);
-      const ivec2 at = staircase_position(13 * i % staircase_samples(stairs), stairs);
-      list.ask(ivec4(foot, across, along, at.x | at.y << 10 | i % 2 << 20), vec4(i / 2 % 2, 0, 0, 0));
+      const HalfSize size = half_size(list, i);
+      const ivec2 stairs = half_staircase(size.across, size.along);
+      const auto samples = static_cast<float>(staircase_samples(stairs) - 1);
+      const ivec2 at = staircase_position(static_cast<int>(list.uniform(0, samples)), stairs);
+      list.ask(ivec4(foot, size.across, size.along, at.x | at.y << 8 | i / 8 % 2 << 19),
+               vec4(i / 16 % 2, 0, 0, 0));
     }
   }
 }

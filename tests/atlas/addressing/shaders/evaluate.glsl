@@ -97,7 +97,7 @@ Answer evaluate(int function, ivec4 n, vec4 x) {
     a.n.x = point.half_number;
     a.x = vec4(point.up, point.out_along, at.x, at.y);
   } else if (function == kHalfWeights) {
-    HalfSample at = half_weights(ivec2(n.w & 1023, n.w >> 10 & 1023), n.y, n.z, n.w >> 20, foot_from_code(n.x));
+    HalfSample at = half_weights(ivec2(n.w & 255, n.w >> 8 & 2047), n.y, n.z, n.w >> 19, foot_from_code(n.x));
     a.x = x.x < 0.5f ? vec4(at.weights.x, at.weights.y, at.step_along.x, at.step_along.y)
                      : vec4(at.weights.x, at.weights.y, at.step_up.x, at.step_up.y);
   }
