@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -26,8 +27,11 @@ class DaemonFixture : public testing::Test {
     auto daemon = server::Daemon::start(settings, clock_);
     ASSERT_TRUE(daemon.ok()) << daemon.status();
     daemon_ = *std::move(daemon);
-    control_ = v1::Control::NewStub(grpc::CreateChannel(
-        "127.0.0.1:" + std::to_string(daemon_->control_port()), grpc::InsecureChannelCredentials()));
+    const auto channel = grpc::CreateChannel("127.0.0.1:" + std::to_string(daemon_->control_port()),
+                                             grpc::InsecureChannelCredentials());
+    // gRPC 1.51 may give up its first connection (is_starting() in tools/controlled_session.cpp).
+    ASSERT_TRUE(channel->WaitForConnected(std::chrono::system_clock::now() + std::chrono::minutes(1)));
+    control_ = v1::Control::NewStub(channel);
   }
 
   Ticket new_ticket() {

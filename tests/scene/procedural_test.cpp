@@ -1,8 +1,10 @@
 #include "scene/procedural.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 
 namespace tessera::scene {
@@ -131,12 +133,13 @@ TEST(Specs, NamesAndErrors) {
 }
 
 TEST(Specs, APathBeginsAtZero) {
-  const std::string file = testing::TempDir() + "/late_path.csv";
+  const std::string file = testing::TempDir() + "/late_path_" + std::to_string(getpid()) + ".csv";
   std::ofstream(file) << "t_seconds,px,py,pz,qx,qy,qz,qw\n12.5,1,2,3,0,0,0,1\n13,2,2,3,0,0,0,1\n";
   const auto path = load_path(file);
   ASSERT_TRUE(path.ok()) << path.status();
   EXPECT_EQ(path->poses().front().time_ns, 0);
   EXPECT_EQ(path->at(from_seconds(0.25)).position.x, 1.5);
+  std::filesystem::remove(file);
 }
 
 }  // namespace

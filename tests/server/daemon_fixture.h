@@ -4,6 +4,7 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <memory>
 #include <string>
 #include <thread>
@@ -30,7 +31,13 @@ class DaemonTest : public testing::Test {
     auto daemon = Daemon::start(settings, clock_);
     ASSERT_TRUE(daemon.ok()) << daemon.status();
     daemon_ = *std::move(daemon);
-    control_ = v1::Control::NewStub(channel(settings.tls_certificate));
+    control_ = connected(channel(settings.tls_certificate));
+  }
+  // gRPC 1.51 may give up its first connection (is_starting() in client-sdk/tools/controlled_session.cpp).
+  static std::unique_ptr<v1::Control::Stub> connected(const std::shared_ptr<grpc::Channel>& channel) {
+    const std::chrono::nanoseconds patience(kPatienceNs);
+    EXPECT_TRUE(channel->WaitForConnected(std::chrono::system_clock::now() + patience));
+    return v1::Control::NewStub(channel);
   }
 
   // `certificate`: what the daemon must show, made for "localhost"; empty: clear text. `token`: what calls

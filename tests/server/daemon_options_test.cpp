@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "../transport/child_process.h"
+
 namespace tessera::server {
 namespace {
 
@@ -25,14 +27,14 @@ void expect_round_trip(const std::vector<std::string>& flags) {
   Options first;
   std::vector<std::string> reversed(flags.rbegin(), flags.rend());
   ASSERT_NO_THROW(first.app.parse(reversed));
-  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "tesserad_round_trip.toml";
+  const transport::test::TemporaryFolder folder;
+  const std::string file = folder.file("tesserad.toml");
   std::ofstream(file) << first.app.config_to_str(true, true);
   Options second;
-  std::vector<std::string> from_file{file.string(), "--config"};
+  std::vector<std::string> from_file{file, "--config"};
   ASSERT_NO_THROW(second.app.parse(from_file)) << testing::PrintToString(flags);
   EXPECT_EQ(first.settings, second.settings) << testing::PrintToString(flags);
   EXPECT_EQ(first.log, second.log);
-  std::filesystem::remove(file);
 }
 
 const std::vector<std::vector<std::string>> kFlags = {{"--address", "::1"},

@@ -265,7 +265,8 @@ TEST_F(DaemonTest, ADensityIsCheckedAgainstTheSceneAndKept) {
 }
 
 TEST_F(DaemonTest, FilesAreReadBelowTheSceneRootOnly) {
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "tessera_scene_root";
+  const transport::test::TemporaryFolder temporary;
+  const std::filesystem::path folder = temporary.file("scenes");
   std::filesystem::create_directories(folder / "inside");
   std::ofstream(folder / "outside.gltf") << "{}";
   std::ofstream(folder / "inside" / "broken.gltf") << "{}";
@@ -281,13 +282,12 @@ TEST_F(DaemonTest, FilesAreReadBelowTheSceneRootOnly) {
   EXPECT_FALSE(broken.ok());
   EXPECT_EQ(broken.error_message().find("outside"), std::string::npos)
       << "it was read: " << broken.error_message();
-  std::filesystem::remove_all(folder);
 }
 
 TEST_F(DaemonTest, TheViewerProgramWritesPictures) {
   start({.scenes = {"hall=gallery:0"}});
-  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "tessera_viewer";
-  std::filesystem::remove_all(folder);
+  const transport::test::TemporaryFolder temporary;
+  const std::filesystem::path folder = temporary.file("pictures");
   const auto run = [&](const std::string& arguments) {
     const std::string command = std::string(TESSERA_CLIENT) +
                                 " --control 127.0.0.1:" + std::to_string(daemon_->control_port()) +
@@ -308,7 +308,6 @@ TEST_F(DaemonTest, TheViewerProgramWritesPictures) {
   EXPECT_EQ(run("--scene hall --codec gif 2>/dev/null"), 2);
   EXPECT_EQ(run("--scene attic 2>/dev/null"), 1);
   EXPECT_EQ(run("--scene hall --fps 0 2>/dev/null"), 2);
-  std::filesystem::remove_all(folder);
 }
 
 TEST_F(DaemonTest, ABusyControlPortIsNamed) {

@@ -48,8 +48,8 @@ class Process : public DaemonTest {
   void serve(const std::string& arguments = {}) {
     run("--scene hall=gallery:0 " + arguments + kFreePorts);
     ASSERT_TRUE(logged("serving")) << log();
-    control_ = v1::Control::NewStub(grpc::CreateChannel(
-        absl::StrCat("127.0.0.1:", port_in_log("control_port")), grpc::InsecureChannelCredentials()));
+    control_ = connected(grpc::CreateChannel(absl::StrCat("127.0.0.1:", port_in_log("control_port")),
+                                             grpc::InsecureChannelCredentials()));
   }
   // Also if the signal comes again and again.
   void expect_end() {
