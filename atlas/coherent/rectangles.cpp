@@ -18,7 +18,7 @@ constexpr float kSparsest = 0.7f, kDensest = 2.5f;
 
 struct WidthTable {
   // By the wish in whole texels; of two at the same distance the wider.
-  std::array<uint16_t, kShelfHeight + 1> nearest{};
+  std::array<uint16_t, kLongestSide + 1> nearest{};
   constexpr WidthTable() {
     for (size_t wish = 0; wish < nearest.size(); ++wish) {
       nearest[wish] = kWidths[0];
@@ -72,7 +72,7 @@ Wish wish(const RectangleNeed& need, bool masked, float scale, const MostSides& 
     return height_near(height_intervals * std::min(length / static_cast<float>(width - 1), kMostExcess) + 1,
                        highest);
   };
-  uint16_t width = std::min(kWidthTable.nearest[multiple_near(length + 1, 1, kShelfHeight)], widest);
+  uint16_t width = std::min(kWidthTable.nearest[multiple_near(length + 1, 1, kLongestSide)], widest);
   uint16_t height = height_at(width);
   if (height > width) {
     // Nearly a square: one of the next width if that has no fewer samples where it has fewest, else cut off.
@@ -108,8 +108,8 @@ uint64_t texels(const RectangleSize& size, bool masked) {
 }  // namespace
 
 MostSides most_sides(uint32_t atlas_width, uint32_t atlas_height) {
-  return {static_cast<uint16_t>(std::min(atlas_width, kShelfHeight)),
-          static_cast<uint16_t>(std::min(atlas_height, kShelfHeight))};
+  return {static_cast<uint16_t>(std::min(atlas_width, kLongestSide)),
+          static_cast<uint16_t>(std::min(atlas_height, kLongestSide))};
 }
 
 RectangleNeed rectangle_need(const scene::Footprint& footprint, uint8_t triangle_count) {

@@ -26,7 +26,7 @@ struct RectangleSize {
 
 // The largest sides that a rectangle may have, in texels: those of a shelf, or of a smaller atlas.
 struct MostSides {
-  uint16_t width = kShelfHeight, height = kShelfHeight;
+  uint16_t width = kLongestSide, height = kLongestSide;
 };
 MostSides most_sides(uint32_t atlas_width, uint32_t atlas_height);
 

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <functional>
 
 namespace tessera::atlas::coherent {
 namespace {
 
 using Bits = unsigned __int128;
+
+constexpr uint64_t kSlabsInAtlas = 256;  // at least so many have room, where their rectangles are not higher
 
 Bits low_bits(uint32_t count) {
   return count >= 128 ? ~Bits{0} : (Bits{1} << count) - 1;
@@ -82,7 +85,7 @@ std::optional<uint32_t> last_gap(const std::vector<uint8_t>& taken, uint32_t len
 
 }  // namespace
 
-Slabs::Slabs(uint32_t width, uint32_t height) {
+Slabs::Slabs(uint32_t width, uint32_t height) : capacity_texels_(uint64_t{width} * height) {
   assert(width % kUnit == 0 && height % kUnit == 0);
   for (uint32_t y = 0; y < height; y += kShelfHeight) {
     const uint32_t units = width / kUnit;
@@ -105,14 +108,14 @@ std::optional<uvec2> Slabs::take(uint32_t index, uint32_t rows) {
 std::optional<uvec2> Slabs::take_from_width(uint32_t width, uint32_t rows) {
   for (const uint32_t index : by_width_[width]) {
     const Slab& slab = slabs_[index];
-    if (slab.used + rows > shelves_[slab.shelf].units) continue;
+    if (slab.used + rows > slab.height) continue;
     if (const auto at = take(index, rows)) return at;
   }
   return std::nullopt;
 }
 
 std::optional<uvec2> Slabs::allocate(uint32_t width, uint32_t height, bool may_draw) {
-  assert(width >= kUnit && width <= kShelfHeight && height >= kUnit && height <= kShelfHeight);
+  assert(width >= kUnit && width <= kLongestSide && height >= kUnit && height <= kLongestSide);
   const auto at = find(width / kUnit, height / kUnit, may_draw);
   if (at) used_texels_ += uint64_t{width} * height;
   return at;
@@ -123,42 +126,84 @@ std::optional<uvec2> Slabs::find(uint32_t width, uint32_t rows, bool may_draw) {
   if (!may_draw) return std::nullopt;
   if (const auto slab = draw_slab(width, rows)) return take(*slab, rows);
   // Better too wide than none.
-  for (uint32_t wider = width + 1; wider <= std::min(4 * width, kShelfHeight / kUnit); ++wider) {
+  for (uint32_t wider = width + 1; wider <= std::min(4 * width, kLongestSide / kUnit); ++wider) {
     if (const auto at = take_from_width(wider, rows)) return at;
   }
   return std::nullopt;
 }
 
+uint32_t Slabs::height_of(std::span<const Shelf> shelves) {
+  uint32_t units = 0;
+  for (const Shelf& shelf : shelves) units += shelf.units;
+  return units;
+}
+
+uint32_t Slabs::shelves_for(uint32_t width, uint32_t rows) const {
+  const auto texels = [&](uint32_t shelves) { return uint64_t{width} * kUnit * shelves * kShelfHeight; };
+  uint32_t shelves = kMostShelves;
+  while (shelves > 1 && shelves / 2 * kShelfHeight >= rows * kUnit &&
+         texels(shelves) * kSlabsInAtlas > capacity_texels_)
+    shelves /= 2;
+  return shelves;
+}
+
+std::span<const Slabs::Shelf> Slabs::shelves_from(uint32_t first, uint32_t shelves) const {
+  return std::span(shelves_).subspan(first, std::min<size_t>(shelves, shelves_.size() - first));
+}
+
+std::optional<uint32_t> Slabs::find_gap(std::span<const Shelf> shelves, uint32_t width) {
+  if (std::ranges::any_of(shelves, [&](const Shelf& s) { return s.free_units < width; })) return std::nullopt;
+  taken_ = shelves[0].taken;
+  for (const Shelf& shelf : shelves.subspan(1))
+    std::ranges::transform(taken_, shelf.taken, taken_.begin(), std::bit_or());
+  return is_square_wise(width) ? first_gap(taken_, width) : last_gap(taken_, width);
+}
+
+// A lower one if there is no room for the best.
 std::optional<uint32_t> Slabs::draw_slab(uint32_t width, uint32_t rows) {
-  for (uint32_t s = 0; s < shelves_.size(); ++s) {
-    Shelf& shelf = shelves_[s];
-    if (shelf.free_units < width || shelf.units < rows) continue;
-    const auto gap = is_square_wise(width) ? first_gap(shelf.taken, width) : last_gap(shelf.taken, width);
-    if (!gap) continue;
-    std::fill_n(shelf.taken.begin() + *gap, width, uint8_t{1});
-    shelf.free_units -= width;
-    if (unused_.empty()) {
-      unused_.push_back(static_cast<uint32_t>(slabs_.size()));
-      slabs_.emplace_back();
-    }
-    const uint32_t index = unused_.back();
-    unused_.pop_back();
-    const auto x = static_cast<uint16_t>(*gap);
-    slabs_[index] = {.x = x,
-                     .width = static_cast<uint16_t>(width),
-                     .shelf = static_cast<uint16_t>(s),
-                     .free_rows = low_bits(shelf.units)};
-    std::fill_n(shelf.slab_of_x.begin() + x, width, index);
-    by_width_[width].push_back(index);
-    return index;
+  for (uint32_t shelves = shelves_for(width, rows); shelves * kShelfHeight >= rows * kUnit; shelves /= 2) {
+    if (const auto slab = draw_slab_of(width, rows, shelves)) return slab;
   }
   return std::nullopt;
+}
+
+std::optional<uint32_t> Slabs::draw_slab_of(uint32_t width, uint32_t rows, uint32_t shelves) {
+  for (uint32_t first = 0; first < shelves_.size(); first += shelves) {
+    const std::span<const Shelf> room = shelves_from(first, shelves);
+    const uint32_t height = height_of(room);
+    if (height < rows) continue;
+    if (const auto gap = find_gap(room, width))
+      return add_slab({.x = static_cast<uint16_t>(*gap),
+                       .width = static_cast<uint16_t>(width),
+                       .height = static_cast<uint16_t>(height),
+                       .shelf = static_cast<uint16_t>(first),
+                       .shelves = static_cast<uint16_t>(room.size()),
+                       .free_rows = low_bits(height)});
+  }
+  return std::nullopt;
+}
+
+uint32_t Slabs::add_slab(const Slab& slab) {
+  if (unused_.empty()) {
+    unused_.push_back(static_cast<uint32_t>(slabs_.size()));
+    slabs_.emplace_back();
+  }
+  const uint32_t index = unused_.back();
+  unused_.pop_back();
+  slabs_[index] = slab;
+  for (Shelf& shelf : std::span(shelves_).subspan(slab.shelf, slab.shelves)) {
+    std::fill_n(shelf.taken.begin() + slab.x, slab.width, uint8_t{1});
+    std::fill_n(shelf.slab_of_x.begin() + slab.x, slab.width, index);
+    shelf.free_units -= slab.width;
+  }
+  by_width_[slab.width].push_back(index);
+  return index;
 }
 
 void Slabs::free(uvec2 at, uint32_t width, uint32_t height) {
   const uint32_t index = index_at(at), rows = height / kUnit;
   Slab& slab = slabs_[index];
-  const Bits freed = low_bits(rows) << (at.y % kShelfHeight / kUnit);
+  const Bits freed = low_bits(rows) << ((at.y - slab.shelf * kShelfHeight) / kUnit);
   assert((slab.free_rows & freed) == 0);
   slab.free_rows |= freed;
   slab.used = static_cast<uint16_t>(slab.used - rows);
@@ -168,9 +213,10 @@ void Slabs::free(uvec2 at, uint32_t width, uint32_t height) {
 
 void Slabs::release(uint32_t index) {
   const Slab& slab = slabs_[index];
-  Shelf& shelf = shelves_[slab.shelf];
-  std::fill_n(shelf.taken.begin() + slab.x, slab.width, uint8_t{0});
-  shelf.free_units += slab.width;
+  for (Shelf& shelf : std::span(shelves_).subspan(slab.shelf, slab.shelves)) {
+    std::fill_n(shelf.taken.begin() + slab.x, slab.width, uint8_t{0});
+    shelf.free_units += slab.width;
+  }
   std::erase(by_width_[slab.width], index);
   unused_.push_back(index);
 }
@@ -181,13 +227,13 @@ bool Slabs::close_emptiest(uint64_t budget_texels, float fullest) {
     uint32_t index;
   };
   std::vector<Candidate> candidates;
-  std::array<uint32_t, kShelfHeight / kUnit + 1> room{};  // rows free in slabs of a width
+  std::array<uint32_t, kLongestSide / kUnit + 1> room{};  // rows free in slabs of a width
   for (const auto& slabs : by_width_) {
     for (const uint32_t index : slabs) {
       const Slab& slab = slabs_[index];
       if (slab.closed) continue;
-      room[slab.width] += shelves_[slab.shelf].units - slab.used;
-      const float share = static_cast<float>(slab.used) / static_cast<float>(shelves_[slab.shelf].units);
+      room[slab.width] += slab.height - slab.used;
+      const float share = static_cast<float>(slab.used) / static_cast<float>(slab.height);
       if (share <= fullest) candidates.push_back({share, index});
     }
   }
@@ -199,36 +245,39 @@ bool Slabs::close_emptiest(uint64_t budget_texels, float fullest) {
     Slab& slab = slabs_[candidate.index];
     const uint64_t texels = texels_in(slab);
     // All of its height is no longer there: the free part, and what the rest takes elsewhere.
-    const uint32_t height = shelves_[slab.shelf].units;
-    if (texels > budget_texels || room[slab.width] < height) continue;
-    room[slab.width] -= height;
+    if (texels > budget_texels || room[slab.width] < slab.height) continue;
+    room[slab.width] -= slab.height;
     budget_texels -= texels;
     slab.closed = closed = true;
   }
   return closed;
 }
 
-std::vector<uint32_t> Slabs::slabs_within(const Shelf& shelf, uint32_t x, uint32_t width) const {
+std::vector<uint32_t> Slabs::slabs_within(std::span<const Shelf> shelves, uint32_t x, uint32_t width) const {
   std::vector<uint32_t> within;
-  for (uint32_t at = x; at < x + width;) {
-    if (!shelf.taken[at]) {
-      ++at;
-      continue;
+  for (const Shelf& shelf : shelves) {
+    for (uint32_t at = x; at < x + width;) {
+      if (!shelf.taken[at]) {
+        ++at;
+        continue;
+      }
+      const uint32_t index = shelf.slab_of_x[at];
+      if (std::ranges::find(within, index) == within.end()) within.push_back(index);
+      at = slabs_[index].x + slabs_[index].width;
     }
-    within.push_back(shelf.slab_of_x[at]);
-    at = slabs_[within.back()].x + slabs_[within.back()].width;
   }
   return within;
 }
 
 bool Slabs::close_for(uint32_t width, uint32_t height, uint64_t budget_texels) {
-  const uint32_t units = width / kUnit;
+  const uint32_t units = width / kUnit, rows = height / kUnit, shelves = shelves_for(units, rows);
   std::vector<uint32_t> cheapest;
   uint64_t least = budget_texels + 1;
-  for (const Shelf& shelf : shelves_) {
-    if (shelf.units < height / kUnit) continue;
-    for (uint32_t x = 0; x + units <= shelf.taken.size(); x += step_of(units)) {
-      std::vector<uint32_t> within = slabs_within(shelf, x, units);
+  for (uint32_t first = 0; first < shelves_.size(); first += shelves) {
+    const std::span<const Shelf> room = shelves_from(first, shelves);
+    if (height_of(room) < rows) continue;
+    for (uint32_t x = 0; x + units <= room[0].taken.size(); x += step_of(units)) {
+      std::vector<uint32_t> within = slabs_within(room, x, units);
       uint64_t texels = 0;
       for (const uint32_t index : within) texels += texels_in(slabs_[index]);
       if (texels >= least) continue;
@@ -245,10 +294,9 @@ void Slabs::reopen() {
 }
 
 SlabStats Slabs::stats() const {
-  SlabStats stats{.used_texels = used_texels_};
+  SlabStats stats{.used_texels = used_texels_, .capacity_texels = capacity_texels_};
   for (const Shelf& shelf : shelves_) {
     const uint64_t height = uint64_t{shelf.units} * kUnit;
-    stats.capacity_texels += shelf.taken.size() * kUnit * height;
     stats.slab_texels += (shelf.taken.size() - shelf.free_units) * kUnit * height;
   }
   return stats;

@@ -2,8 +2,13 @@
 // rectangles one below another:
 //
 //   shelf   across the atlas, kShelfHeight texels high (the last may be lower)
-//   slab    as wide as its rectangles (or wider), as high as the shelf; drawn when its width runs out of room
+//   slab    as wide as its rectangles (or wider), as high as 1, 2, 4 or 8 shelves; drawn when its width runs
+//   out
+//           of room
 //   rect    of the slab's width and any even height
+//
+// One slab of each width is half empty in the mean, so none should be a large part of the atlas: the wider,
+// the lower, and in a small atlas all are.
 //
 // So both dimensions are packed as intervals of a line, where free neighbours merge by themselves: unlike
 // power-of-two blocks on stacks, freed room serves every height, and an empty slab every width.
@@ -16,15 +21,18 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/math.h"
 
 namespace tessera::atlas::coherent {
 
-constexpr uint32_t kShelfHeight = 256;  // texels; the largest side of a rectangle, too
-constexpr uint32_t kSquare = 8;         // texels
-constexpr uint32_t kUnit = 2;           // texels: all sides and places are multiples
+constexpr uint32_t kShelfHeight = 32;                           // texels
+constexpr uint32_t kMostShelves = 8;                            // of a slab; a power of two
+constexpr uint32_t kLongestSide = kMostShelves * kShelfHeight;  // of a rectangle
+constexpr uint32_t kSquare = 8;                                 // texels
+constexpr uint32_t kUnit = 2;                                   // texels: all sides and places are multiples
 
 struct SlabStats {
   uint64_t used_texels = 0;      // in rectangles
@@ -38,7 +46,7 @@ class Slabs {
   // Sides of the atlas: even, at most 8192.
   Slabs(uint32_t width, uint32_t height);
 
-  // Upper left texel of a free rectangle, or nothing if there is no room. Sides: even, 2..kShelfHeight. In
+  // Upper left texel of a free rectangle, or nothing if there is no room. Sides: even, 2..kLongestSide. In
   // the first slab of its width that has room; if it may draw, else in a new slab, or in the narrowest wider
   // one that has room, up to four times as wide.
   std::optional<uvec2> allocate(uint32_t width, uint32_t height, bool may_draw = true);
@@ -64,8 +72,9 @@ class Slabs {
   using Rows = unsigned __int128;  // a bit for each unit of a slab's height; 1 = free
 
   struct Slab {
-    uint16_t x = 0, width = 0, shelf = 0;  // x, width in units
-    uint16_t used = 0;                     // units of height
+    uint16_t x = 0, width = 0, height = 0;  // in units
+    uint16_t shelf = 0, shelves = 0;        // the first, and how many
+    uint16_t used = 0;                      // units of height
     bool closed = false;
     Rows free_rows = 0;
   };
@@ -79,19 +88,28 @@ class Slabs {
   const Slab& slab_at(uvec2 at) const { return slabs_[index_at(at)]; }
   uint32_t index_at(uvec2 at) const { return shelves_[at.y / kShelfHeight].slab_of_x[at.x / kUnit]; }
   uint64_t texels_in(const Slab& slab) const { return uint64_t{slab.used} * slab.width * kUnit * kUnit; }
-  // The slabs of a shelf that stand in any of `width` units from `x` on.
-  std::vector<uint32_t> slabs_within(const Shelf& shelf, uint32_t x, uint32_t width) const;
+  // How many shelves a new slab should take: at least for `rows`.
+  uint32_t shelves_for(uint32_t width, uint32_t rows) const;
+  // `shelves` from `first` on, a multiple of it; fewer at the end of the atlas.
+  std::span<const Shelf> shelves_from(uint32_t first, uint32_t shelves) const;
+  static uint32_t height_of(std::span<const Shelf> shelves);  // units
+  std::optional<uint32_t> find_gap(std::span<const Shelf> shelves, uint32_t width);
+  // The slabs that stand in any of `width` units from `x` on.
+  std::vector<uint32_t> slabs_within(std::span<const Shelf> shelves, uint32_t x, uint32_t width) const;
   std::optional<uvec2> find(uint32_t width, uint32_t rows, bool may_draw);
   std::optional<uvec2> take(uint32_t slab, uint32_t rows);
   std::optional<uvec2> take_from_width(uint32_t width, uint32_t rows);
   std::optional<uint32_t> draw_slab(uint32_t width, uint32_t rows);
+  std::optional<uint32_t> draw_slab_of(uint32_t width, uint32_t rows, uint32_t shelves);
+  uint32_t add_slab(const Slab& slab);
   void release(uint32_t slab);
 
   std::vector<Shelf> shelves_;
   std::vector<Slab> slabs_;                                               // some unused
   std::vector<uint32_t> unused_;                                          // indices of slabs_
-  std::array<std::vector<uint32_t>, kShelfHeight / kUnit + 1> by_width_;  // by units, in the order of drawing
-  uint64_t used_texels_ = 0;
+  std::array<std::vector<uint32_t>, kLongestSide / kUnit + 1> by_width_;  // by units, in the order of drawing
+  std::vector<uint8_t> taken_;                                            // scratch of find_gap()
+  uint64_t capacity_texels_ = 0, used_texels_ = 0;
 };
 
 }  // namespace tessera::atlas::coherent

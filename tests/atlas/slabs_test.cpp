@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <random>
 
 #include "occupancy.h"
@@ -81,13 +83,61 @@ TEST(Slabs, ANarrowRectangleTakesAWiderSlabBeforeItGoesWithout) {
   EXPECT_EQ(slabs.stats().used_texels, 0u);
 }
 
+// In a new slab of 256 rows, also where slabs of that width are lower.
+uvec2 allocate_alone(Slabs& slabs, uint32_t width, uint32_t height) {
+  if (height > 128) return *slabs.allocate(width, height);
+  const uvec2 above = *slabs.allocate(width, 256 - height), at = *slabs.allocate(width, height);
+  slabs.free(above, width, 256 - height);
+  return at;
+}
+
 // A slab with `height` rows in use, and another of its width that has room for them. Returns where they are.
 uvec2 allocate_movable(Slabs& slabs, uint32_t width, uint32_t height) {
   const uvec2 gap = *slabs.allocate(width, 152);
   slabs.allocate(width, 104);
-  const uvec2 at = *slabs.allocate(width, height);
+  const uvec2 at = allocate_alone(slabs, width, height);
   slabs.free(gap, width, 152);
   return at;
+}
+
+// Else a few widths would fill a small atlas.
+TEST(Slabs, ASlabIsASmallPartOfTheAtlasOrAsLowAsItCanBe) {
+  for (const auto& [sides, rows] :
+       {std::pair{uvec2(8192, 4096), 256u}, {{2048, 1024}, 256}, {{256, 256}, 32}}) {
+    for (uint32_t width = 2; width <= 256; width += 2) {
+      for (uint32_t height = 2; height <= 256; height += 2) {
+        Slabs slabs(sides.x, sides.y);
+        ASSERT_TRUE(slabs.allocate(width, height).has_value());
+        const uint64_t texels = slabs.stats().slab_texels, lowest = std::max(std::bit_ceil(height), 32u);
+        EXPECT_TRUE(texels == width * lowest || texels * 256 <= slabs.stats().capacity_texels)
+            << width << "x" << height;
+        EXPECT_LE(texels, width * 256);
+        EXPECT_GE(texels, width == 2 ? width * rows : 0) << "as high as it may be";
+      }
+    }
+  }
+}
+
+TEST(Slabs, ASmallAtlasHoldsARectangleOfEachWidth) {
+  Slabs slabs(256, 256);
+  std::vector<Rect> rects;
+  for (uint32_t width = 80; width >= 2; width -= 2) {
+    const auto at = slabs.allocate(width, 8);
+    ASSERT_TRUE(at.has_value()) << width;
+    rects.push_back({*at, {width, 8}});
+  }
+  check(slabs, rects, 256, 256);
+}
+
+TEST(Slabs, WhereTheBestHasNoRoomALowerSlabWillDo) {
+  Slabs slabs(64, 8192);  // slabs of 8 have 256 rows, of 64 as few as they can
+  std::vector<uvec2> at;
+  while (const auto next = slabs.allocate(64, 128)) at.push_back(*next);
+  ASSERT_EQ(at.size(), 64u);
+  for (size_t i = 0; i < at.size(); i += 2) slabs.free(at[i], 64, 128);
+  EXPECT_FALSE(slabs.allocate(8, 136).has_value()) << "gaps of 128 rows are left";
+  EXPECT_TRUE(slabs.allocate(8, 8).has_value());
+  EXPECT_EQ(slabs.stats().slab_texels, 32u * 64 * 128 + 8 * 128);
 }
 
 TEST(Slabs, WhatABudgetIsTooSmallForStopsNoOther) {
@@ -114,24 +164,24 @@ TEST(Slabs, WhatHasNoRoomInOthersOfItsWidthStays) {
 }
 
 TEST(Slabs, RoomIsMadeOnlyWhereItIsHighEnough) {
-  Slabs slabs(64, 320);  // the second shelf has 64 rows
+  Slabs slabs(64, 320);  // below the first 256 rows are 64
   const uvec2 high = *slabs.allocate(64, 200), low = *slabs.allocate(64, 64);
   ASSERT_EQ(low.y, 256u);
   slabs.free(low, 64, 64);
-  EXPECT_TRUE(slabs.close_for(64, 100, 1 << 20)) << "the free shelf is too low";
+  EXPECT_TRUE(slabs.close_for(64, 100, 1 << 20)) << "the free room is too low";
   EXPECT_TRUE(slabs.closed(high));
 }
 
 TEST(Slabs, WholeSquaresComeFromTheLeftAndTheTopAndTheRestFromTheOtherEnds) {
-  Slabs slabs(64, 256);
+  Slabs slabs(4096, 256);
   EXPECT_EQ(slabs.allocate(8, 16), uvec2(0, 0));
   EXPECT_EQ(slabs.allocate(8, 4), uvec2(0, 252));
   EXPECT_EQ(slabs.allocate(8, 2), uvec2(0, 250));
   EXPECT_EQ(slabs.allocate(8, 12), uvec2(0, 236)) << "at a multiple of four";
   EXPECT_EQ(slabs.allocate(8, 8), uvec2(0, 16));
-  EXPECT_EQ(slabs.allocate(12, 8), uvec2(52, 0));
-  EXPECT_EQ(slabs.allocate(2, 8), uvec2(50, 0));
-  EXPECT_EQ(slabs.allocate(4, 8), uvec2(44, 0)) << "at a multiple of four";
+  EXPECT_EQ(slabs.allocate(12, 8), uvec2(4084, 0));
+  EXPECT_EQ(slabs.allocate(2, 8), uvec2(4082, 0));
+  EXPECT_EQ(slabs.allocate(4, 8), uvec2(4076, 0)) << "at a multiple of four";
   EXPECT_EQ(slabs.allocate(16, 8), uvec2(8, 0));
 }
 
@@ -185,7 +235,7 @@ TEST(Slabs, RoomIsMadeWhereItIsCheapest) {
   std::vector<uvec2> at, rest;
   const uint32_t heights[] = {200, 160, 180, 60, 80, 220, 240, 20};
   for (const uint32_t height : heights) {
-    at.push_back(*slabs.allocate(32, height));
+    at.push_back(allocate_alone(slabs, 32, height));
     rest.push_back(*slabs.allocate(32, 256 - height));
   }
   for (size_t i = 0; i < rest.size(); ++i) slabs.free(rest[i], 32, 256 - heights[i]);
