@@ -24,7 +24,7 @@ struct RectangleSize {
   bool operator==(const RectangleSize&) const = default;
 };
 
-// The largest sides that a rectangle may have, in texels: those of a shelf, or of a smaller atlas.
+// The largest sides that a rectangle may have, in texels: those of the largest slab, or of a smaller atlas.
 struct MostSides {
   uint16_t width = kLongestSide, height = kLongestSide;
 };

@@ -10,7 +10,7 @@ namespace {
 
 using Bits = unsigned __int128;
 
-constexpr uint64_t kSlabsInAtlas = 256;  // at least so many have room, where their rectangles are not higher
+constexpr uint64_t kSlabsInAtlas = 256;  // at least so many have room, if their rectangles let them be as low
 
 Bits low_bits(uint32_t count) {
   return count >= 128 ? ~Bits{0} : (Bits{1} << count) - 1;

@@ -2,8 +2,7 @@
 // rectangles one below another:
 //
 //   shelf   across the atlas, kShelfHeight texels high (the last may be lower)
-//   slab    as wide as its rectangles (or wider), as high as 1, 2, 4 or 8 shelves; drawn when its width runs
-//   out
+//   slab    as wide as its rectangles (or wider), 1, 2, 4 or 8 shelves high; drawn when its width runs out
 //           of room
 //   rect    of the slab's width and any even height
 //
