@@ -285,6 +285,26 @@ TEST_F(CoherentLayout, TheFirstFrameFindsAPlaceForAll) {
   }
 }
 
+// Of many shapes, so that no width has many rectangles.
+TEST_F(CoherentLayout, ASmallAtlasIsUsedAsWellAsALargeOne) {
+  for (const auto& [width, height, patches] :
+       {std::tuple{256u, 256u, 50u}, {512u, 256u, 100u}, {2048u, 1024u, 600u}}) {
+    make(patches, {.width = width, .height = height});
+    std::mt19937 random(5);
+    std::exponential_distribution<float> side(0.05f);
+    VisiblePatches visible;
+    for (scene::PatchId p = 0; p < scene_.patch_count; ++p) {
+      const float u = 2 + side(random), v = 2 + side(random);
+      visible.push_back({p, {u, v, u * v}});
+    }
+    mirror_.clear();
+    update(visible);
+    const LayoutStats& stats = layout_->stats();
+    EXPECT_EQ(stats.colors_out_of_memory + stats.blocks_halved, 0u);
+    EXPECT_GT(static_cast<double>(stats.used_texels), 0.6 * width * height) << width << "x" << height;
+  }
+}
+
 TEST_F(CoherentLayout, AFullAtlasFallsBackToColorsAndRecovers) {
   make(2000, {.width = 256, .height = 256, .levels = {.max_bias = 0}});
   update(rectangles(2000, 20, 20));
