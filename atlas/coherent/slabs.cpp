@@ -10,6 +10,7 @@ namespace {
 
 using Bits = unsigned __int128;
 
+constexpr uint16_t kAnyRows = UINT16_MAX;
 constexpr uint64_t kSlabsInAtlas = 256;  // at least so many have room, if their rectangles let them be as low
 
 Bits low_bits(uint32_t count) {
@@ -87,6 +88,7 @@ std::optional<uint32_t> last_gap(const std::vector<uint8_t>& taken, uint32_t len
 
 Slabs::Slabs(uint32_t width, uint32_t height) : capacity_texels_(uint64_t{width} * height) {
   assert(width % kUnit == 0 && height % kUnit == 0);
+  no_slab_for_.fill(kAnyRows);
   for (uint32_t y = 0; y < height; y += kShelfHeight) {
     const uint32_t units = width / kUnit;
     shelves_.push_back({.units = std::min(kShelfHeight, height - y) / kUnit,
@@ -159,11 +161,14 @@ std::optional<uint32_t> Slabs::find_gap(std::span<const Shelf> shelves, uint32_t
   return is_square_wise(width) ? first_gap(taken_, width) : last_gap(taken_, width);
 }
 
-// A lower one if there is no room for the best.
+// A lower one if there is no room for the best. What found none need not look again until some is given back:
+// where thousands come into view, that is most of the work.
 std::optional<uint32_t> Slabs::draw_slab(uint32_t width, uint32_t rows) {
+  if (rows >= no_slab_for_[width]) return std::nullopt;
   for (uint32_t shelves = shelves_for(width, rows); shelves * kShelfHeight >= rows * kUnit; shelves /= 2) {
     if (const auto slab = draw_slab_of(width, rows, shelves)) return slab;
   }
+  no_slab_for_[width] = static_cast<uint16_t>(rows);
   return std::nullopt;
 }
 
@@ -217,6 +222,7 @@ void Slabs::release(uint32_t index) {
     std::fill_n(shelf.taken.begin() + slab.x, slab.width, uint8_t{0});
     shelf.free_units += slab.width;
   }
+  no_slab_for_.fill(kAnyRows);
   std::erase(by_width_[slab.width], index);
   unused_.push_back(index);
 }

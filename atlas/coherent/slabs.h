@@ -107,6 +107,7 @@ class Slabs {
   std::vector<Slab> slabs_;                                               // some unused
   std::vector<uint32_t> unused_;                                          // indices of slabs_
   std::array<std::vector<uint32_t>, kLongestSide / kUnit + 1> by_width_;  // by units, in the order of drawing
+  std::array<uint16_t, kLongestSide / kUnit + 1> no_slab_for_;            // rows, by width, since a release
   std::vector<uint8_t> taken_;                                            // scratch of find_gap()
   uint64_t capacity_texels_ = 0, used_texels_ = 0;
 };

@@ -104,15 +104,17 @@ uvec2 allocate_movable(Slabs& slabs, uint32_t width, uint32_t height) {
 TEST(Slabs, ASlabIsASmallPartOfTheAtlasOrAsLowAsItCanBe) {
   for (const auto& [sides, rows] :
        {std::pair{uvec2(8192, 4096), 256u}, {{2048, 1024}, 256}, {{256, 256}, 32}}) {
+    Slabs slabs(sides.x, sides.y);
     for (uint32_t width = 2; width <= 256; width += 2) {
       for (uint32_t height = 2; height <= 256; height += 2) {
-        Slabs slabs(sides.x, sides.y);
-        ASSERT_TRUE(slabs.allocate(width, height).has_value());
+        const auto at = slabs.allocate(width, height);
+        ASSERT_TRUE(at.has_value());
         const uint64_t texels = slabs.stats().slab_texels, lowest = std::max(std::bit_ceil(height), 32u);
         EXPECT_TRUE(texels == width * lowest || texels * 256 <= slabs.stats().capacity_texels)
             << width << "x" << height;
         EXPECT_LE(texels, width * 256);
         EXPECT_GE(texels, width == 2 ? width * rows : 0) << "as high as it may be";
+        slabs.free(*at, width, height);
       }
     }
   }
@@ -138,6 +140,8 @@ TEST(Slabs, WhereTheBestHasNoRoomALowerSlabWillDo) {
   EXPECT_FALSE(slabs.allocate(8, 136).has_value()) << "gaps of 128 rows are left";
   EXPECT_TRUE(slabs.allocate(8, 8).has_value());
   EXPECT_EQ(slabs.stats().slab_texels, 32u * 64 * 128 + 8 * 128);
+  slabs.free(at[1], 64, 128);
+  EXPECT_TRUE(slabs.allocate(8, 136).has_value()) << "what found no room finds it once there is";
 }
 
 TEST(Slabs, WhatABudgetIsTooSmallForStopsNoOther) {
