@@ -376,7 +376,7 @@ TEST(Gather, RefusesPlacementsThatLeaveTheAtlasOrTheScene) {
       Gather::create(device(), *world.gpu_scene, *world.lighting, {.width = 16, .height = 16});
   ASSERT_TRUE(gather.ok());
   for (const Placement& p : {block(1, 0, 0, 2, 2), block(0, 14, 0, 2, 2), block(0, 0, 14, 2, 2),
-                             block(0, 0, 0, 40, 2), Placement{.patch = scene::kNone}}) {
+                             block(0, 0, 0, 15, 2), Placement{.patch = scene::kNone}}) {
     gpu::Commands commands = device().begin();
     EXPECT_EQ((*gather)->record(commands, *world.instant, look({}, {0, 0, -1}), {&p, 1}).code(),
               absl::StatusCode::kInvalidArgument);
