@@ -11,7 +11,7 @@ namespace {
 using Bits = unsigned __int128;
 
 constexpr uint16_t kAnyRows = UINT16_MAX;
-constexpr uint64_t kSlabsInAtlas = 256;  // at least so many have room, if their rectangles let them be as low
+constexpr uint64_t kSlabsInAtlas = 256;  // at least, but where they are as low as they can be
 
 Bits low_bits(uint32_t count) {
   return count >= 128 ? ~Bits{0} : (Bits{1} << count) - 1;

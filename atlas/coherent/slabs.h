@@ -1,16 +1,16 @@
-// Memory of layout `coherent`. The atlas is cut into shelves, a shelf into slabs side by side, a slab into
-// rectangles one below another:
+// Memory of layout `coherent`. The atlas is cut into shelves, aligned groups of shelves into slabs side by
+// side, a slab into rectangles one below another:
 //
 //   shelf   across the atlas, kShelfHeight texels high (the last may be lower)
-//   slab    as wide as its rectangles (or wider), 1, 2, 4 or 8 shelves high; drawn when its width runs out
-//           of room
+//   slab    as wide as its rectangles (or wider), 1, 2, 4 or 8 shelves high (fewer at the atlas' end); drawn
+//           when its width runs out of room
 //   rect    of the slab's width and any even height
 //
-// One slab of each width is half empty in the mean, so none should be a large part of the atlas: the wider,
-// the lower, and in a small atlas all are.
+// So widths, and heights within a slab, are packed as intervals of a line, where free neighbours merge by
+// themselves: freed room serves every height that fits its slab, an empty slab every width.
 //
-// So both dimensions are packed as intervals of a line, where free neighbours merge by themselves: unlike
-// power-of-two blocks on stacks, freed room serves every height, and an empty slab every width.
+// One slab of each width is half empty in the mean, so none should be a large part of the atlas: the wider,
+// the lower, and in a small atlas all are. The price: free shelves make a higher slab in aligned groups only.
 //
 // JPEG and H.264 transform squares of 8 texels, and one that two rectangles share costs bits. So slabs whose
 // widths are whole squares stand on squares, from the left, and rectangles of such heights from the top; the
@@ -57,14 +57,15 @@ class Slabs {
   // use) stay open, and those whose rectangles are higher in sum than the gaps in the others of their width.
   // Returns whether any was closed.
   bool close_emptiest(uint64_t budget_texels, float fullest);
-  // Closes the slabs that stand where a new one for this rectangle is the cheapest to clear, if these hold at
-  // most `budget_texels`. Returns whether any was closed: none if there is room already.
+  // Closes the slabs that stand where a new one of the best height for this rectangle is the cheapest to
+  // clear, if these hold at most `budget_texels`. Returns whether any was closed: none if it has room
+  // already. For when allocate() found none.
   bool close_for(uint32_t width, uint32_t height, uint64_t budget_texels);
   bool closed(uvec2 at) const { return slab_at(at).closed; }
   void reopen();
 
   SlabStats stats() const;
-  // Width of free room in the shelves, as a share of them: new slabs can be drawn from it.
+  // Free room in the shelves, as a share of them. It may lie in pieces too low for a slab of 8 shelves.
   float free_share() const;
 
  private:
