@@ -153,10 +153,10 @@ TEST_F(Operation, MetricsCountWhatASessionDoesAndKeepItAfterwards) {
   EXPECT_GE(session.key_frames(), 1u);
   EXPECT_GT(session.packets_sent(), 0u);
   EXPECT_THAT(session.encoder(), HasSubstr("264"));
-  EXPECT_GT(session.atlas().used(), 0.01);
+  EXPECT_GT(session.atlas().used(), 0.025);
   EXPECT_LT(session.atlas().used() + session.atlas().fragmented(), 1);
   EXPECT_EQ(session.atlas().without_place(), 0u);
-  EXPECT_GT(metric("tesserad_session_atlas_used_ratio" + label), 0.01);
+  EXPECT_GT(metric("tesserad_session_atlas_used_ratio" + label), 0.025);
   EXPECT_LT(metric("tesserad_session_atlas_fragmented_ratio" + label), 1);
   EXPECT_EQ(metric("tesserad_session_atlas_patches_without_place" + label), 0);
   EXPECT_EQ(metric("tesserad_session_atlas_bias" + label), session.atlas().bias());
